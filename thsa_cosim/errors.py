@@ -1,0 +1,74 @@
+"""The exception tree.
+
+::
+
+    ThsaCosimError
+    ├── InputError              bad input: exit code 2
+    │   ├── ScenarioError       a scenario file: key, value, reference
+    │   ├── RecordingError      a measured file: format, column, samples
+    │   ├── ParameterError      bounds, scale, names
+    │   ├── UnitError           unknown or incompatible unit
+    │   ├── FmuError            an archive that is no usable FMU
+    │   └── ModelicaError       a model outside the exportable subset
+    ├── MissingExtraError       an optional dependency is needed: exit code 2
+    └── StudyError              the study ran but has no usable result: exit code 3
+
+Every message is one sentence that names the file, the key and the remedy. A simulation that fails is
+no exception but an outcome (``thsa_cosim.batch``).
+"""
+
+import difflib
+from collections.abc import Iterable
+
+
+class ThsaCosimError(Exception):
+    """Base of every error that the command line turns into one sentence."""
+
+    exit_code = 2
+
+
+class InputError(ThsaCosimError):
+    """Bad input; the message names the file, the key and the remedy."""
+
+
+class ScenarioError(InputError):
+    """A scenario file holds a wrong key, value or reference."""
+
+
+class RecordingError(InputError):
+    """A recording cannot be read or holds unusable samples."""
+
+
+class ParameterError(InputError):
+    """A parameter's name, bounds or scale is wrong."""
+
+
+class UnitError(InputError):
+    """A unit is unknown or has the wrong dimension."""
+
+
+class FmuError(InputError):
+    """An archive is not a usable FMU."""
+
+
+class ModelicaError(InputError):
+    """A Modelica model is outside the exportable subset; the message names the equation or variable."""
+
+
+class MissingExtraError(ThsaCosimError):
+    """A feature needs an optional dependency that is not installed."""
+
+    def __init__(self, feature: str, extra: str) -> None:
+        super().__init__(f"{feature} needs an optional part: pip install 'thsa-cosim[{extra}]'.")
+
+
+class StudyError(ThsaCosimError):
+    """A study ran but has no usable result."""
+
+    exit_code = 3
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return ``" Did you mean 'x'?"`` for the closest of ``known``, or an empty string."""
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return f" Did you mean {close[0]!r}?" if close else ""

@@ -1,0 +1,160 @@
+"""Units: conversion between the spellings of recordings, scenarios, Modelica and the FMI.
+
+Modelica and FMI 2.0 (section 2.2.2) write ``N.m/(rad/s)``, ``kg.m2``, ``s-1``; people write ``Nm``,
+``N*m``, ``m/s^2``, ``°C``. All of them are accepted.
+"""
+
+import re
+from functools import lru_cache
+from typing import TypeVar
+
+import pint
+
+from thsa_cosim.errors import UnitError, did_you_mean
+from thsa_cosim.signals import FloatArray
+
+Numeric = TypeVar("Numeric", float, FloatArray)
+
+_COMMON = (
+    "1", "%", "rad", "deg", "s", "ms", "Hz", "m", "mm", "um", "m/s", "mm/s", "m/s2", "rad/s", "deg/s", "rpm",
+    "kg", "kg.m2", "N", "kN", "N/m", "N.s/m", "N/(m/s)", "N.m", "N.m.s/rad", "N.m/(rad/s)", "Pa", "bar", "A",
+    "V", "W", "Ohm", "H", "Wb", "V.s/rad", "A/(rad/s)", "degC", "K",
+)  # fmt: skip
+_SPELLINGS = {"": "1", "-": "1", "U/min": "rpm", "rev/min": "rpm", "r/min": "rpm"}
+_ANGLES = {"radian", "degree", "turn", "revolution", "revolutions_per_minute", "revolutions_per_second"}
+_OFFSET_UNITS = {name: f"delta_{name}" for name in ("degree_Celsius", "degree_Fahrenheit", "degree_Reaumur")}
+
+
+@lru_cache(maxsize=1)
+def _registry() -> pint.UnitRegistry[float]:
+    registry: pint.UnitRegistry[float] = pint.UnitRegistry()
+    registry.define("newton_meter = newton * meter = Nm")
+    registry.define("newton_meter_second = newton * meter * second = Nms")
+    for alias in ("ohm = Ohm = Ohms", "volt = Volt = Volts", "revolution = rev", "ampere = Ampere = Amps"):
+        registry.define(f"@alias {alias}")
+    return registry
+
+
+def _pint_spelling(unit: str) -> str:
+    text = _SPELLINGS.get(unit.strip(), unit.strip())
+    # A digit straight after a symbol is an exponent (m2, s-1), a dot between symbols a product (N.m).
+    text = re.sub(r"(?<!\w)([^\W\d_]+)([+-]?\d+)(?!\w)", r"\1**(\2)", text)
+    return re.sub(r"(?<!\d)\.|\.(?!\d)", "*", text)
+
+
+@lru_cache(maxsize=1024)
+def _parse(unit: str) -> pint.Unit:
+    if len(unit) > 80:
+        raise UnitError(f"unit {unit[:40]!r}... is too long to be a unit.")
+    try:
+        return _registry().parse_units(_pint_spelling(unit))
+    except Exception:  # pint raises a dozen types, AssertionError and TokenError among them
+        raise UnitError(
+            f"unknown unit {unit!r}; write it as in 'N.m/(rad/s)'.{did_you_mean(unit, _COMMON)}"
+        ) from None
+
+
+def _speaks_of_angle(unit: pint.Unit) -> bool:
+    return bool(_ANGLES & set(unit._units))
+
+
+def _check_frequency(source: str, target: str) -> None:
+    """Refuse Hz against rad/s: pint takes both as 1/s, which hides a factor of 2 pi."""
+    a, b = _parse(source), _parse(target)
+    if _speaks_of_angle(a) == _speaks_of_angle(b) or dict(a.dimensionality) != {"[time]": -1}:
+        return
+    plain, name = (b, target) if _speaks_of_angle(a) else (a, source)
+    if set(plain._units) != {"second"}:
+        other = source if name is target else target
+        raise UnitError(
+            f"unit {name!r} does not say whether it counts turns or radians, so it cannot be turned into"
+            f" {other!r}; write 'rpm', 'rev/s' or 'rad/s'."
+        )
+
+
+@lru_cache(maxsize=1024)
+def conversion(source: str, target: str) -> tuple[float, float]:
+    """Return ``(factor, offset)`` such that ``value_in_target = factor * value_in_source + offset``.
+
+    Raises
+    ------
+    UnitError
+        If a unit is unknown, the dimensions differ, or the pair hides a factor of 2 pi (Hz and rad/s).
+    """
+    a, b = _parse(source), _parse(target)
+    if source == target or a == b:
+        return 1.0, 0.0
+    _check_frequency(source, target)
+    registry = _registry()
+    try:
+        factor = float(registry.Quantity(1.0, _difference(a)).to(_difference(b)).magnitude)
+        offset = 0.0
+        if _OFFSET_UNITS.keys() & (set(a._units) | set(b._units)):
+            offset = float(registry.Quantity(0.0, a).to(b).magnitude)
+    except Exception:
+        raise UnitError(
+            f"unit {source!r} cannot be turned into {target!r}: the dimensions differ"
+            f" ({a.dimensionality} against {b.dimensionality})."
+        ) from None
+    return factor, offset
+
+
+def _difference(unit: pint.Unit) -> pint.Unit:
+    """Return the unit of a difference: degC becomes delta_degC, everything else stays."""
+    names = list(unit._units)
+    return _parse(_OFFSET_UNITS[names[0]]) if len(names) == 1 and names[0] in _OFFSET_UNITS else unit
+
+
+def convert(values: Numeric, source: str, target: str) -> Numeric:
+    """Return ``values`` (scalar or (n,)) converted from ``source`` to ``target``, offsets included (degC, K).
+
+    Raises
+    ------
+    UnitError
+        As :func:`conversion`.
+    """
+    factor, offset = conversion(source, target)
+    if factor == 1.0 and offset == 0.0:
+        return values
+    return values * factor + offset
+
+
+def same_dimension(a: str, b: str) -> bool:
+    """Return whether ``a`` converts to ``b``; raises :class:`UnitError` if either unit is unknown."""
+    _parse(a), _parse(b)
+    try:
+        conversion(a, b)
+    except UnitError:
+        return False
+    return True
+
+
+def is_unit(text: str) -> bool:
+    """Return whether ``text`` is a unit that can be converted."""
+    try:
+        _parse(text)
+    except UnitError:
+        return False
+    return True
+
+
+def base_exponents(unit: str) -> tuple[dict[str, int], float, float]:
+    """Return FMI base-unit exponents, factor and offset of ``unit`` (FMI 2.0.4 section 2.2.2, ``BaseUnit``).
+
+    The exponents are over kg, m, s, A, K, mol, cd and rad; ``base = factor * value + offset``.
+    """
+    parsed = _parse(unit)
+    dimensions = {
+        "[mass]": "kg", "[length]": "m", "[time]": "s", "[current]": "A",
+        "[temperature]": "K", "[substance]": "mol", "[luminosity]": "cd",
+    }  # fmt: skip
+    exponents = {dimensions[d]: round(float(e)) for d, e in dict(parsed.dimensionality).items()}
+    angle = sum(e for name, e in parsed._units.items() if name in _ANGLES)
+    if angle:
+        exponents["rad"] = round(float(angle))
+    ordered = {base: exponents[base] for base in dimensions.values() if exponents.get(base)}
+    if exponents.get("rad"):
+        ordered["rad"] = exponents["rad"]
+    base = "*".join(f"{name}**{power}" for name, power in ordered.items()) or "1"
+    factor, offset = conversion(unit, base)
+    return ordered, factor, offset

@@ -6,7 +6,7 @@ Modelica and FMI 2.0 (section 2.2.2) write ``N.m/(rad/s)``, ``kg.m2``, ``s-1``; 
 
 import re
 from functools import lru_cache
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import pint
 
@@ -87,10 +87,10 @@ def conversion(source: str, target: str) -> tuple[float, float]:
     _check_frequency(source, target)
     registry = _registry()
     try:
-        factor = float(registry.Quantity(1.0, _difference(a)).to(_difference(b)).magnitude)
+        factor = registry.Quantity(1.0, _difference(a)).to(_difference(b)).magnitude
         offset = 0.0
         if _OFFSET_UNITS.keys() & (set(a._units) | set(b._units)):
-            offset = float(registry.Quantity(0.0, a).to(b).magnitude)
+            offset = registry.Quantity(0.0, a).to(b).magnitude
     except Exception:
         raise UnitError(
             f"unit {source!r} cannot be turned into {target!r}: the dimensions differ"
@@ -148,10 +148,10 @@ def base_exponents(unit: str) -> tuple[dict[str, int], float, float]:
         "[mass]": "kg", "[length]": "m", "[time]": "s", "[current]": "A",
         "[temperature]": "K", "[substance]": "mol", "[luminosity]": "cd",
     }  # fmt: skip
-    exponents = {dimensions[d]: round(float(e)) for d, e in dict(parsed.dimensionality).items()}
+    exponents = {dimensions[d]: round(cast(float, e)) for d, e in dict(parsed.dimensionality).items()}
     angle = sum(e for name, e in parsed._units.items() if name in _ANGLES)
     if angle:
-        exponents["rad"] = round(float(angle))
+        exponents["rad"] = round(cast(float, angle))
     ordered = {base: exponents[base] for base in dimensions.values() if exponents.get(base)}
     if exponents.get("rad"):
         ordered["rad"] = exponents["rad"]

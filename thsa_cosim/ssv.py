@@ -1,0 +1,122 @@
+"""Parameter sets as SSV files: System Structure and Parameterization 1.0, ``SystemStructureParameterValues``.
+
+Source: Modelica Association, *System Structure and Parameterization* 1.0 (2019), section 6, and its XSD.
+"""
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from thsa_cosim.errors import ParameterError, UnitError
+from thsa_cosim.units import base_exponents
+
+_SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+_SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """FMU start values by variable name, each with its unit (``""``: none given)."""
+
+    name: str
+    values: Mapping[str, float]
+    units: Mapping[str, str] = field(default_factory=dict)
+    description: str = ""
+
+
+def write_ssv(path: Path, parameters: ParameterSet) -> None:
+    """Write ``parameters`` as an SSV 1.0 file, with every unit defined by its SI exponents.
+
+    Raises
+    ------
+    ParameterError
+        For a value that is not finite.
+    UnitError
+        For a unit that is unknown.
+    """
+    ET.register_namespace("ssv", _SSV)
+    ET.register_namespace("ssc", _SSC)
+    root = ET.Element(f"{{{_SSV}}}ParameterSet", {"version": "1.0", "name": parameters.name})
+    if parameters.description:
+        root.set("description", parameters.description)
+    root.set("generationTool", "thsa-cosim")
+    listed = ET.SubElement(root, f"{{{_SSV}}}Parameters")
+    used: dict[str, None] = {}
+    for name, value in parameters.values.items():
+        if not math.isfinite(value):
+            raise ParameterError(f"{path}: value of {name!r} is {value}; only finite values can be written.")
+        real = ET.SubElement(ET.SubElement(listed, f"{{{_SSV}}}Parameter", {"name": name}), f"{{{_SSV}}}Real")
+        real.set("value", repr(float(value)))
+        if unit := parameters.units.get(name, ""):
+            real.set("unit", unit)
+            used[unit] = None
+    if used:
+        units = ET.SubElement(root, f"{{{_SSV}}}Units")
+        for unit in used:
+            exponents, factor, offset = base_exponents(unit)
+            attributes = {base: str(power) for base, power in exponents.items()}
+            if factor != 1.0:
+                attributes["factor"] = repr(factor)
+            if offset != 0.0:
+                attributes["offset"] = repr(offset)
+            ET.SubElement(
+                ET.SubElement(units, f"{{{_SSC}}}Unit", {"name": unit}), f"{{{_SSC}}}BaseUnit", attributes
+            )
+    ET.indent(root)
+    ET.ElementTree(root).write(path, encoding="UTF-8", xml_declaration=True)
+
+
+def read_ssv(path: Path) -> ParameterSet:
+    """Read an SSV 1.x file; Real, Integer and Boolean values come back as floats.
+
+    Raises
+    ------
+    ParameterError
+        If the file is missing, is no SSV file, or sets a String, Enumeration or Binary.
+    """
+    try:
+        root = ET.parse(path).getroot()
+    except OSError as error:
+        raise ParameterError(f"{path}: cannot be read ({error.strerror or error}); check the path.") from None
+    except (ET.ParseError, ValueError, LookupError) as error:
+        raise ParameterError(f"{path}: is no XML file ({error}); give a .ssv file of SSP 1.0.") from None
+    if root.tag != f"{{{_SSV}}}ParameterSet":
+        raise ParameterError(f"{path}: holds {root.tag!r}, not the ParameterSet of an SSP 1.0 .ssv file.")
+    values: dict[str, float] = {}
+    units: dict[str, str] = {}
+    for parameter in root.iterfind(f"{{{_SSV}}}Parameters/{{{_SSV}}}Parameter"):
+        name = parameter.get("name", "")
+        if name in values:
+            raise ParameterError(f"{path}: parameter {name!r} is set twice; remove one.")
+        values[name] = _number(path, name, parameter)
+        real = parameter.find(f"{{{_SSV}}}Real")
+        if real is not None and real.get("unit"):
+            units[name] = _known_unit(path, name, real.get("unit", ""))
+    return ParameterSet(root.get("name", ""), values, units, root.get("description", ""))
+
+
+def _known_unit(path: Path, name: str, unit: str) -> str:
+    try:
+        base_exponents(unit)
+    except UnitError as error:
+        raise UnitError(f"{path}: parameter {name!r}: {error}") from None
+    return unit
+
+
+def _number(path: Path, name: str, parameter: ET.Element) -> float:
+    child = next(iter(parameter), None)
+    kind = "nothing" if child is None else child.tag.removeprefix(f"{{{_SSV}}}")
+    if child is None or kind not in ("Real", "Integer", "Boolean"):
+        raise ParameterError(f"{path}: parameter {name!r} holds {kind}; only numbers can be set.")
+    text = child.get("value", "").strip()
+    if kind == "Boolean" and text in ("true", "false"):
+        return float(text == "true")
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ParameterError(f"{path}: parameter {name!r}: {text!r} is no finite number.")
+    return number

@@ -1,0 +1,22 @@
+within THSA;
+model Screw "Roller screw with stiff, damped contact between screw and nut"
+  THSA.Interfaces.RotationalFlange flange_a "Screw shaft";
+  THSA.Interfaces.TranslationalFlange flange_b "Nut";
+  parameter THSA.Units.Length P_h(min=1e-5, max=1) = 10e-3 "Lead";
+  parameter THSA.Units.Stiffness k_s(min=1, max=1e12) = 3.0e8 "Contact stiffness";
+  parameter THSA.Units.Damping d_s(min=0, max=1e9) = 5.0e5 "Contact damping";
+  final parameter Real k(unit="m/rad") = P_h/(2*3.141592653589793) "Travel per angle";
+  THSA.Units.Force F_s "Contact force on the nut";
+  THSA.Units.Velocity v_s "Relative speed of the contact";
+equation
+  v_s = k*der(flange_a.phi) - der(flange_b.s);
+  F_s = k_s*(k*flange_a.phi - flange_b.s) + d_s*v_s;
+  flange_a.tau = k*F_s;
+  flange_b.f = -F_s;
+  annotation(
+    Documentation(info="<html><p>F_s = k_s (k &theta;_g &minus; x) + d_s (k &omega;_g &minus; dx/dt), T_s = k F_s,
+k = P_h/(2&pi;). The screw's own friction is that of the nut (<code>Nut</code>).</p></html>"),
+    Icon(graphics={Rectangle(extent={{-100,10},{100,-10}}, lineColor={0,0,0}, fillColor={160,160,164}, fillPattern=FillPattern.HorizontalCylinder),
+      Rectangle(extent={{-30,50},{30,-50}}, lineColor={0,0,0}, fillColor={200,200,200}, fillPattern=FillPattern.Solid),
+      Text(extent={{-100,100},{100,60}}, textString="%name", textColor={0,0,255})}));
+end Screw;

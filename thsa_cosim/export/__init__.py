@@ -1,0 +1,89 @@
+"""Modelica class → FMU: flatten, order the equations, generate C, compile, pack.
+
+``flatten`` → ``causal`` (with ``expression``, ``structure``, ``solve``) → ``codegen`` and ``description`` →
+``compile`` → ``archive``; the C that is the same for every model is in ``runtime/``.
+"""
+
+import dataclasses
+import os
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from thsa_cosim.errors import MissingExtraError, ModelicaError, ParameterError, did_you_mean
+
+__all__ = ["export_fmu"]
+
+
+def export_fmu(
+    model: str,
+    *,
+    package: Path = Path("modelica/THSA"),
+    fmi: int = 2,
+    output: Path | None = None,
+    compiler: str = "native",
+    start_values: Mapping[str, float] | None = None,
+    platforms: Sequence[str] | None = None,
+) -> Path:
+    """Export a Modelica class as an FMU with Co-Simulation and Model Exchange; returns the archive's path.
+
+    Parameters
+    ----------
+    model:
+        Class name (``THSA.Actuator`` or ``Actuator``) or the path of a ``.mo`` file.
+    package:
+        Folder of the Modelica package.
+    fmi:
+        FMI version, 2 or 3.
+    output:
+        The archive to write; default ``<last part of the class name>.fmu`` in the working directory.
+    compiler:
+        "native" for the exporter of this package, "omc" to hand the class to OpenModelica.
+    start_values:
+        Start values of parameters that replace those of the model, in the model's units.
+    platforms:
+        Targets to compile for, as folders of FMI 3.0 (``x86_64-linux``, …); default all.
+
+    Raises
+    ------
+    ModelicaError
+        The class does not compile or is outside the supported subset; the message names the equation or variable.
+    ParameterError
+        A start value names no parameter of the model.
+    MissingExtraError
+        rumoca, CasADi or ziglang is not installed.
+    """
+    if fmi not in (2, 3):
+        raise ModelicaError(f"FMI version {fmi} is not supported; choose 2 or 3.")
+    if compiler == "omc":
+        from thsa_cosim.export.openmodelica import export_with_openmodelica
+
+        return export_with_openmodelica(model, package, fmi, output)
+    try:
+        import casadi  # noqa: F401
+    except ImportError as error:
+        raise MissingExtraError("Exporting a Modelica model", "export") from error
+    from thsa_cosim.export.archive import write_fmu
+    from thsa_cosim.export.causal import make_causal
+    from thsa_cosim.export.compile import PLATFORMS
+    from thsa_cosim.export.flatten import flatten
+
+    causal = make_causal(flatten(model, package))
+    if start_values:
+        settable = {v.name for v in causal.variables if v.start is not None}
+        for name in start_values:
+            if name not in settable:
+                raise ParameterError(
+                    f"{causal.flat.name}: has no start value {name!r} to set.{did_you_mean(name, settable)}"
+                )
+        variables = tuple(
+            dataclasses.replace(v, start=float(start_values[v.name])) if v.name in start_values else v
+            for v in causal.variables
+        )
+        causal = dataclasses.replace(causal, variables=variables)
+    chosen = [p for p in PLATFORMS if platforms is None or p.fmi3 in platforms]
+    if output is None:
+        output = Path(causal.flat.name.rsplit(".", 1)[-1] + ".fmu")
+    date = float(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
+    write_fmu(causal, fmi, output, date=date, platforms=chosen)
+    return output

@@ -261,7 +261,8 @@ class _Builder:
         """Initial values of the states, the symbols of their start values, and the starts that may be set."""
         flat = self.flat.variables
         x_start = ca.SX.sym("x_start", len(states))
-        required, optional = list(equations), []
+        required = list(equations)
+        optional: list[tuple[ca.SX, str]] = []
         owner: dict[str, str] = {}
         for variable in self.unknowns:
             if variable.name not in states and variable.fixed is not True:
@@ -279,11 +280,6 @@ class _Builder:
             (required if variable.fixed is True else optional).append(
                 (self.symbols[variable.name] - start, label)
             )
-        for name in states:
-            if name not in flat:
-                raise ModelicaError(
-                    f"{self.flat.name}: {name} would have to be a state; mark another variable with StateSelect.prefer."
-                )
         solution, used = self.system.solve_initial(required, optional, self.flat.name)
         initial = column([solution[name] for name in states])
         settable_starts = {

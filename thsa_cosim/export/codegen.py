@@ -10,7 +10,7 @@ _KINDS = ("state", "derivative", "input", "parameter", "dependent", "algebraic")
 
 
 def value_reference(model: CausalModel, variable: ModelVariable) -> int:
-    """Value reference of a variable: time is 0, then states, derivatives, inputs, parameters, dependents, algebraics."""
+    """Value reference: time is 0, then states, derivatives, inputs, parameters, dependents, algebraics."""
     return first_value_references(model)[variable.kind] + variable.index
 
 

@@ -56,7 +56,7 @@ def fmi2_description(
         numberOfEventIndicators=str(model.g.numel()),
     )
     for tag, capabilities in (("ModelExchange", FMI2_MODEL_EXCHANGE), ("CoSimulation", FMI2_CO_SIMULATION)):
-        interface = ET.SubElement(root, tag, modelIdentifier=identifier, **capabilities)
+        interface = ET.SubElement(root, tag, {"modelIdentifier": identifier, **capabilities})
         files = ET.SubElement(interface, "SourceFiles")
         for name in sources:
             ET.SubElement(files, "File", name=name)
@@ -72,8 +72,8 @@ def fmi2_description(
         attributes, real = _attributes(model, variable)
         if variable.name.startswith("der("):
             real["derivative"] = number[model.states[variable.index]]
-        scalar = ET.SubElement(entries, "ScalarVariable", **attributes)
-        ET.SubElement(scalar, "Real", **real)
+        scalar = ET.SubElement(entries, "ScalarVariable", attributes)
+        ET.SubElement(scalar, "Real", real)
     structure = ET.SubElement(root, "ModelStructure")
     outputs, derivatives, dependencies = _structure(model)
     knowns = [number[name] for name in _known_names(model)]
@@ -82,7 +82,7 @@ def fmi2_description(
             group = ET.SubElement(structure, tag)
             for name in unknowns:
                 ET.SubElement(
-                    group, "Unknown", index=number[name], **_fmi2_dependencies(dependencies[name], knowns)
+                    group, "Unknown", {"index": number[name], **_dependencies(dependencies[name], knowns)}
                 )
     initial = _initial_unknowns(model)
     if initial:
@@ -105,8 +105,8 @@ def fmi3_description(model: CausalModel, identifier: str, token: str, date: str)
         generationDateAndTime=date,
         variableNamingConvention="structured",
     )
-    ET.SubElement(root, "ModelExchange", modelIdentifier=identifier, **FMI3_COMMON)
-    ET.SubElement(root, "CoSimulation", modelIdentifier=identifier, **FMI3_COMMON, **FMI3_CO_SIMULATION)
+    ET.SubElement(root, "ModelExchange", {"modelIdentifier": identifier, **FMI3_COMMON})
+    ET.SubElement(root, "CoSimulation", {"modelIdentifier": identifier, **FMI3_COMMON, **FMI3_CO_SIMULATION})
     _units(root, model)
     categories = ET.SubElement(root, "LogCategories")
     for name, text in LOG_CATEGORIES.items():
@@ -128,14 +128,14 @@ def fmi3_description(model: CausalModel, identifier: str, token: str, date: str)
         attributes, real = _attributes(model, variable)
         held = primary.get(attributes["valueReference"])
         if held is not None:
-            ET.SubElement(held, "Alias", name=variable.name, **_described(variable))
+            ET.SubElement(held, "Alias", {"name": variable.name, **_described(variable)})
             continue
         attributes |= {key: value for key, value in real.items() if key != "unit"}
         if variable.unit:
             attributes["unit"] = variable.unit
         if variable.name.startswith("der("):
             attributes["derivative"] = reference[model.states[variable.index]]
-        primary[attributes["valueReference"]] = ET.SubElement(entries, "Float64", **attributes)
+        primary[attributes["valueReference"]] = ET.SubElement(entries, "Float64", attributes)
     first = first_value_references(model)["indicator"]
     for index in range(model.g.numel()):
         ET.SubElement(
@@ -147,8 +147,8 @@ def fmi3_description(model: CausalModel, identifier: str, token: str, date: str)
     knowns = [reference[name] for name in _known_names(model)]
     for tag, unknowns in (("Output", outputs), ("ContinuousStateDerivative", derivatives)):
         for name in unknowns:
-            extra = _fmi2_dependencies(dependencies[name], knowns)
-            ET.SubElement(structure, tag, valueReference=reference[name], **extra)
+            listed = _dependencies(dependencies[name], knowns)
+            ET.SubElement(structure, tag, {"valueReference": reference[name], **listed})
     for name in _initial_unknowns(model):
         ET.SubElement(structure, "InitialUnknown", valueReference=reference[name])
     for index in range(model.g.numel()):
@@ -219,7 +219,7 @@ def _units(root: ET.Element, model: CausalModel) -> None:
             attributes["factor"] = repr(base.factor)
         if base.offset:
             attributes["offset"] = repr(base.offset)
-        ET.SubElement(ET.SubElement(definitions, "Unit", name=name), "BaseUnit", **attributes)
+        ET.SubElement(ET.SubElement(definitions, "Unit", name=name), "BaseUnit", attributes)
 
 
 def _experiment(root: ET.Element, model: CausalModel) -> None:
@@ -257,7 +257,7 @@ def _structure(model: CausalModel) -> tuple[list[str], list[str], dict[str, list
     return outputs, derivatives, dependencies
 
 
-def _fmi2_dependencies(indices: list[int], knowns: list[str]) -> dict[str, str]:
+def _dependencies(indices: list[int], knowns: list[str]) -> dict[str, str]:
     return {"dependencies": " ".join(sorted((knowns[i] for i in indices), key=int))}
 
 
@@ -275,4 +275,5 @@ def _initial_unknowns(model: CausalModel) -> list[str]:
 
 def _text(root: ET.Element) -> bytes:
     ET.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="utf-8") + b"\n"
+    body: bytes = ET.tostring(root, encoding="utf-8")
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + body + b"\n"

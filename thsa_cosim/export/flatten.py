@@ -116,7 +116,7 @@ def source_digest(file: Path, package: Path) -> str:
 
 
 def locate(model: str, package: Path) -> tuple[Path, str]:
-    """File and qualified name of a class, given by name or by its ``.mo`` file; raises ModelicaError if there is none."""
+    """File and qualified name of a class given by name or ``.mo`` file; raises ModelicaError if there is none."""
     if model.endswith(".mo"):
         file = Path(model)
         if not file.is_file():
@@ -211,9 +211,7 @@ def _scalars(
     if kind == "Discrete":
         raise ModelicaError(f"{file}: variable {key} is discrete, which the exporter does not support.")
     if type_name not in ("Real", "Integer", "Boolean"):
-        raise ModelicaError(
-            f"{file}: variable {key} has type {type_name}; the exporter supports Real, Integer and Boolean."
-        )
+        raise ModelicaError(f"{file}: variable {key} has type {type_name}, not Real, Integer or Boolean.")
     role = next(iter(causality)).lower() if isinstance(causality, dict) and "." not in key else "local"
     dims = entry["dims"]
     if len(dims) > 1:

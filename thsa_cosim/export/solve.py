@@ -1,6 +1,7 @@
 """The equation system of one model: state selection, block order and symbolic solution."""
 
 import casadi as ca
+import numpy as np
 
 from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export.structure import Incidence, blocks, match, reduce_index
@@ -45,7 +46,7 @@ class EquationSystem:
         if name not in self._derivatives:
             derived = f"der({name})"
             self._derivatives[name] = derived
-            self.add_variable(derived, ca.SX.sym(derived), self._preference[name])
+            self.add_variable(derived, ca.SX.sym(derived))
         return self.symbols[self._derivatives[name]]
 
     def prepare(self, model: str) -> list[str]:
@@ -79,6 +80,10 @@ class EquationSystem:
                     f"{model}: no equation determines {self.names[column]}; the system is structurally singular."
                 )
         chosen = {n for n in candidates if self._columns[n] not in self._matching}
+        for name in chosen & set(self._derivatives.values()):
+            raise ModelicaError(
+                f"{model}: {name} would have to be a state; name it with a variable of its own."
+            )
         return [name for name in self.names if name in chosen]
 
     def solve(self, states: list[str], model: str) -> dict[str, ca.SX]:
@@ -98,7 +103,7 @@ class EquationSystem:
         if unmatched:
             label = labels[max(unmatched)]
             raise ModelicaError(
-                f"{model}: the initialization is over-determined; drop fixed=true or the initial equation {label}."
+                f"{model}: the initialization is over-determined; drop fixed=true or the equation {label}."
             )
         for residual, label in optional:
             if len(rows) == len(columns):
@@ -172,9 +177,13 @@ class EquationSystem:
                 listed = "; ".join(labels[r] for r, _ in block[:4])
                 what = "equation is not linear in" if len(block) == 1 else "algebraic loop is not linear in"
                 raise ModelicaError(f"{model}: the {what} {', '.join(names[:6])}: {listed}.")
+            if matrix.is_constant() and np.linalg.matrix_rank(np.array(ca.DM(matrix))) < len(block):
+                listed = "; ".join(labels[r] for r, _ in block[:4])
+                raise ModelicaError(
+                    f"{model}: singular: {', '.join(names[:6])} cannot be solved from {listed}."
+                )
             constant = ca.substitute([residual], [unknown], [ca.SX.zeros(len(block))])[0]
-            for name, value in zip(names, ca.vertsplit(_linear_solve(matrix, constant)), strict=True):
-                solution[name] = value
+            solution.update(zip(names, ca.vertsplit(_linear_solve(matrix, constant)), strict=True))
         return solution
 
 

@@ -1,0 +1,1 @@
+"""FMUs for the tests, built from the C sources in this folder."""

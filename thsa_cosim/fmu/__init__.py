@@ -1,0 +1,22 @@
+"""FMUs: the only room that knows fmpy and the FMI.
+
+``description``  what an FMU says about itself
+``plant``        an opened FMU: run it with start values and inputs
+``stepping``     the Co-Simulation loop; ``compiled`` the same in machine code
+``exchange``     the integrator for Model Exchange
+``inputs``       how sampled inputs reach an FMU
+"""
+
+from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription, Variable, read_description
+from thsa_cosim.fmu.failure import SimulationFailure, Status
+from thsa_cosim.fmu.plant import Plant
+
+__all__ = [
+    "DefaultExperiment",
+    "FmuDescription",
+    "Plant",
+    "SimulationFailure",
+    "Status",
+    "Variable",
+    "read_description",
+]

@@ -1,0 +1,68 @@
+"""The .fmu file as a zip archive: digest, safe unpacking."""
+
+import hashlib
+import shutil
+import stat
+import zipfile
+from pathlib import Path, PurePosixPath
+
+from thsa_cosim.errors import FmuError
+
+MAXIMUM_UNPACKED_BYTES = 8 * 2**30
+"""Above this an archive is taken for a zip bomb."""
+
+
+def sha256_of(path: Path) -> str:
+    """Return the hex SHA-256 digest of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def open_archive(path: Path) -> zipfile.ZipFile:
+    """Open ``path`` as a zip archive; FmuError says in one sentence why it is none."""
+    if not path.exists():
+        raise FmuError(f"{path} does not exist; name an .fmu file.")
+    if path.is_dir():
+        raise FmuError(f"{path} is a folder; name an .fmu file.")
+    try:
+        return zipfile.ZipFile(path)
+    except (zipfile.BadZipFile, OSError) as error:
+        raise FmuError(f"{path} is no zip archive and so no FMU ({error}).") from None
+
+
+def _points_outside(name: str) -> bool:
+    """Tell whether an entry's name leaves the folder that it is unpacked to."""
+    posix = PurePosixPath(name.replace("\\", "/"))
+    return posix.is_absolute() or ".." in posix.parts or ":" in (posix.parts or ("",))[0] or "\0" in name
+
+
+def check_archive(path: Path, archive: zipfile.ZipFile) -> None:
+    """Refuse entries that would be written outside ("zip slip"), links and zip bombs with FmuError."""
+    total = 0
+    for entry in archive.infolist():
+        # orig_filename is what the file says; filename has been normalised already.
+        if _points_outside(entry.orig_filename) or _points_outside(entry.filename):
+            raise FmuError(
+                f"{path} holds the entry {entry.orig_filename!r}, which points outside the archive."
+            )
+        if stat.S_ISLNK(entry.external_attr >> 16):
+            raise FmuError(f"{path} holds the symbolic link {entry.filename!r}; an FMU has no need of links.")
+        total += entry.file_size
+    if total > MAXIMUM_UNPACKED_BYTES:
+        raise FmuError(f"{path} would unpack to {total / 2**30:.0f} GiB, which no FMU needs.")
+
+
+def unpack(path: Path, folder: Path) -> Path:
+    """Unpack the FMU ``path`` into ``folder`` (created) and return it.
+
+    Nothing is written if any entry points outside ``folder``; a folder begun is removed on failure.
+    """
+    with open_archive(path) as archive:
+        check_archive(path, archive)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            archive.extractall(folder)
+        except (zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError, EOFError) as error:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise FmuError(f"{path} cannot be unpacked ({error}).") from None
+    return folder

@@ -1,0 +1,232 @@
+"""What an FMU says about itself: ``modelDescription.xml`` as frozen objects (FMI 1.0, 2.0 and 3.0)."""
+
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from thsa_cosim.errors import FmuError, did_you_mean
+from thsa_cosim.fmu.archive import open_archive, sha256_of
+
+FLOAT_TYPES = ("Real", "Float64", "Float32")
+_ATTRIBUTES = (
+    "canBeInstantiatedOnlyOncePerProcess",
+    "canGetAndSetFMUstate",
+    "canHandleVariableCommunicationStepSize",
+    "canInterpolateInputs",
+    "canNotUseMemoryManagementFunctions",
+    "canReturnEarlyAfterIntermediateUpdate",
+    "canRunAsynchronuously",
+    "canSerializeFMUstate",
+    "hasEventMode",
+    "maxOutputDerivativeOrder",
+    "mightReturnEarlyFromDoStep",
+    "needsCompletedIntegratorStep",
+    "needsExecutionTool",
+    "providesAdjointDerivatives",
+    "providesDirectionalDerivative",
+    "providesIntermediateUpdate",
+    "recommendedIntermediateInputSmoothness",
+)
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of an FMU; numbers are in ``unit``, ``None`` where the description is silent."""
+
+    name: str
+    value_reference: int
+    causality: str
+    """parameter, calculatedParameter, input, output, local, independent, structuralParameter"""
+    variability: str
+    """constant, fixed, tunable, discrete, continuous"""
+    type: str
+    """Real, Integer, Boolean, String, Enumeration (FMI 1 and 2); Float64, Int32, ... (FMI 3)"""
+    unit: str | None = None
+    start: float | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    description: str = ""
+    is_array: bool = False
+    intermediate_update: bool = False
+    """FMI 3: may be set inside a communication step (clause 4.2.2)."""
+    initial: str | None = None
+    """exact, approx, calculated"""
+
+    @property
+    def is_float(self) -> bool:
+        """Whether the value is a floating-point number."""
+        return self.type in FLOAT_TYPES
+
+
+@dataclass(frozen=True)
+class DefaultExperiment:
+    """Start and stop time [s], relative tolerance and step [s] that the FMU suggests."""
+
+    start: float | None = None
+    stop: float | None = None
+    tolerance: float | None = None
+    step: float | None = None
+
+
+@dataclass(frozen=True)
+class FmuDescription:
+    """What an FMU says about itself."""
+
+    path: Path
+    sha256: str
+    model_name: str
+    fmi_version: str
+    """"1.0", "2.0" or "3.0" """
+    tool: str
+    guid: str
+    supports_co_simulation: bool
+    supports_model_exchange: bool
+    capabilities: Mapping[str, bool | int]
+    """Capability flags by their FMI names, of the Co-Simulation interface where both exist."""
+    variables: Mapping[str, Variable]
+    default_experiment: DefaultExperiment
+    platforms: tuple[str, ...]
+    co_simulation_identifier: str | None = None
+    model_exchange_identifier: str | None = None
+    states: int = 0
+    event_indicators: int = 0
+
+    @property
+    def inputs(self) -> tuple[Variable, ...]:
+        """Variables with causality input, in declaration order."""
+        return tuple(v for v in self.variables.values() if v.causality == "input")
+
+    @property
+    def outputs(self) -> tuple[Variable, ...]:
+        """Variables with causality output, in declaration order."""
+        return tuple(v for v in self.variables.values() if v.causality == "output")
+
+    @property
+    def parameters(self) -> tuple[Variable, ...]:
+        """Variables that can be set before initialisation, in declaration order."""
+        return tuple(
+            v for v in self.variables.values() if v.causality in ("parameter", "structuralParameter")
+        )
+
+    def variable(self, name: str) -> Variable:
+        """Return the variable ``name``; FmuError with a suggestion if there is none."""
+        try:
+            return self.variables[name]
+        except KeyError:
+            hint = did_you_mean(name, self.variables)
+            raise FmuError(f"{self.path} has no variable {name!r}.{hint}") from None
+
+
+def read_description(path: Path | str) -> FmuDescription:
+    """Read an FMU's description without unpacking it; FmuError (one sentence) if it is no usable FMU."""
+    # fmpy and lxml take 0.2 s to import: only where an FMU is really read.
+    import fmpy
+    from fmpy.model_description import read_model_description
+
+    path = Path(path)
+    with open_archive(path) as archive:
+        try:
+            xml = archive.read("modelDescription.xml")
+        except KeyError:
+            raise FmuError(f"{path} is a zip archive without modelDescription.xml and so no FMU.") from None
+        except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, zlib.error) as error:
+            raise FmuError(f"{path}: modelDescription.xml cannot be unpacked ({error}).") from None
+    try:
+        # Many vendor FMUs break the schema in harmless ways; `thsa-cosim check` reports those.
+        raw = read_model_description(str(path), validate=False)
+    except Exception as error:
+        message = " ".join(str(error).split()) or type(error).__name__
+        raise FmuError(f"{path}: modelDescription.xml cannot be read ({message.rstrip('.')}).") from None
+    if raw.coSimulation is None and raw.modelExchange is None:
+        raise FmuError(f"{path} offers neither Co-Simulation nor Model Exchange; export it with one of them.")
+    co_simulation, model_exchange = raw.coSimulation, raw.modelExchange
+    experiment = raw.defaultExperiment
+    intermediate = _intermediate_variables(xml)
+    return FmuDescription(
+        path=path,
+        sha256=sha256_of(path),
+        model_name=raw.modelName or "",
+        fmi_version=f"{raw.fmiVersion.split('.')[0]}.0",
+        tool=raw.generationTool or "",
+        guid=raw.guid or "",
+        supports_co_simulation=co_simulation is not None,
+        supports_model_exchange=model_exchange is not None,
+        capabilities=_capabilities(model_exchange) | _capabilities(co_simulation),
+        variables={v.name: _variable(v, intermediate) for v in raw.modelVariables},
+        default_experiment=DefaultExperiment()
+        if experiment is None
+        else DefaultExperiment(
+            start=_number(experiment.startTime),
+            stop=_number(experiment.stopTime),
+            tolerance=_number(experiment.tolerance),
+            step=_number(experiment.stepSize),
+        ),
+        platforms=tuple(sorted(fmpy.supported_platforms(str(path)))),
+        co_simulation_identifier=getattr(co_simulation, "modelIdentifier", None),
+        model_exchange_identifier=getattr(model_exchange, "modelIdentifier", None),
+        states=len(raw.derivatives) or int(raw.numberOfContinuousStates or 0),
+        event_indicators=len(raw.eventIndicators) or int(raw.numberOfEventIndicators or 0),
+    )
+
+
+def _capabilities(interface: Any) -> dict[str, bool | int]:
+    if interface is None:
+        return {}
+    values = {name: getattr(interface, name, None) for name in _ATTRIBUTES}
+    return {name: int(v) if name in _COUNTS else bool(v) for name, v in values.items() if v is not None}
+
+
+_COUNTS = {"maxOutputDerivativeOrder", "recommendedIntermediateInputSmoothness"}
+
+
+def _variable(raw: Any, intermediate: set[int]) -> Variable:
+    declared = raw.declaredType
+
+    def attribute(name: str) -> Any:
+        own = getattr(raw, name)
+        return own if own is not None else getattr(declared, name, None)
+
+    return Variable(
+        name=raw.name,
+        value_reference=int(raw.valueReference),
+        causality=raw.causality or "local",
+        variability=raw.variability or "continuous",
+        type=raw.type,
+        unit=attribute("unit"),
+        start=_number(raw.start),
+        minimum=_number(attribute("min")),
+        maximum=_number(attribute("max")),
+        nominal=_number(attribute("nominal")),
+        description=raw.description or "",
+        is_array=bool(raw.dimensions),
+        intermediate_update=int(raw.valueReference) in intermediate,
+        initial=raw.initial,
+    )
+
+
+def _intermediate_variables(xml: bytes) -> set[int]:
+    """Value references that FMI 3 allows in Intermediate Update Mode; fmpy does not read that attribute."""
+    if b"intermediateUpdate" not in xml:
+        return set()
+    root = ElementTree.fromstring(xml)
+    variables = root.findall("ModelVariables/*")
+    return {
+        int(v.attrib["valueReference"]) for v in variables if v.get("intermediateUpdate") in ("true", "1")
+    }
+
+
+def _number(text: Any) -> float | None:
+    """Read a number or an FMI boolean; ``None`` for anything else (strings, arrays)."""
+    if text is None:
+        return None
+    if text in ("true", "false"):
+        return float(text == "true")
+    try:
+        return float(text)
+    except ValueError:
+        return None

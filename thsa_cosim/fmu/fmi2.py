@@ -1,0 +1,152 @@
+"""FMI 2.0 through ctypes (clause 2.1 and 4.2 of the FMI 2.0.4 standard)."""
+
+import ctypes
+from functools import cache
+from typing import Any, ClassVar
+
+import numpy as np
+
+from thsa_cosim.fmu.instance import EventInfo, Instance
+from thsa_cosim.fmu.native import Messages
+
+_Logger = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p
+)
+
+
+class _Callbacks(ctypes.Structure):
+    _fields_: ClassVar = [
+        ("logger", _Logger),
+        ("allocate_memory", ctypes.c_void_p),
+        ("free_memory", ctypes.c_void_p),
+        ("step_finished", ctypes.c_void_p),
+        ("environment", ctypes.c_void_p),
+    ]
+
+
+class _EventInfo(ctypes.Structure):
+    _fields_: ClassVar = [
+        ("new_discrete_states_needed", ctypes.c_int),
+        ("terminate_simulation", ctypes.c_int),
+        ("nominals_changed", ctypes.c_int),
+        ("values_changed", ctypes.c_int),
+        ("next_event_time_defined", ctypes.c_int),
+        ("next_event_time", ctypes.c_double),
+    ]
+
+
+class Fmi2Instance(Instance):
+    """One FMI 2.0 instance (Co-Simulation or Model Exchange)."""
+
+    prefix = "fmi2"
+    types: ClassVar[dict[str, tuple[str, Any]]] = {
+        "Real": ("Real", np.float64),
+        "Integer": ("Integer", np.int32),
+        "Enumeration": ("Integer", np.int32),
+        "Boolean": ("Boolean", np.int32),
+    }
+
+    def instantiate(self) -> None:
+        """Call fmi2Instantiate."""
+        callbacks = _shared_callbacks()
+        _listener[0] = self.messages
+        function = self.library.function(
+            "fmi2Instantiate",
+            ctypes.c_char_p,
+            ctypes.c_int,
+            ctypes.c_char_p,
+            ctypes.c_char_p,
+            ctypes.c_void_p,
+            ctypes.c_int,
+            ctypes.c_int,
+            restype=ctypes.c_void_p,
+        )
+        handle = function(
+            b"plant",
+            1 if self.kind == "co-simulation" else 0,
+            self.description.guid.encode(),
+            self.resources.as_uri().encode(),
+            ctypes.addressof(callbacks),
+            0,
+            0,
+        )
+        self.created(handle, "Instantiate")
+
+    def initialize_begin(self, start: float, stop: float, tolerance: float | None) -> None:
+        """fmi2SetupExperiment, fmi2EnterInitializationMode."""
+        self.call(
+            "SetupExperiment",
+            (ctypes.c_int, int(tolerance is not None)),
+            (ctypes.c_double, tolerance or 0.0),
+            (ctypes.c_double, start),
+            (ctypes.c_int, 1),
+            (ctypes.c_double, stop),
+        )
+        self.call("EnterInitializationMode")
+
+    def value_function(self, verb: str, suffix: str) -> Any:
+        """fmi2SetReal, fmi2GetInteger, ..."""
+        pointer = ctypes.c_void_p
+        return self.library.function(f"fmi2{verb}{suffix}", pointer, pointer, ctypes.c_size_t, pointer)
+
+    def access(self, function: Any, references: int, count: int, values: int) -> int:
+        """Set or get ``count`` variables."""
+        return int(function(self.handle, references, count, values))
+
+    def event_iteration(self) -> EventInfo:
+        """fmi2NewDiscreteStates."""
+        info = _EventInfo()
+        self.call("NewDiscreteStates", (ctypes.c_void_p, ctypes.addressof(info)))
+        return EventInfo(
+            bool(info.new_discrete_states_needed),
+            bool(info.terminate_simulation),
+            bool(info.nominals_changed),
+            bool(info.values_changed),
+            info.next_event_time if info.next_event_time_defined else None,
+        )
+
+    def completed_integrator_step(self) -> tuple[bool, bool]:
+        """fmi2CompletedIntegratorStep."""
+        event, terminate = ctypes.c_int(0), ctypes.c_int(0)
+        self.call(
+            "CompletedIntegratorStep",
+            (ctypes.c_int, 1),
+            (ctypes.c_void_p, ctypes.addressof(event)),
+            (ctypes.c_void_p, ctypes.addressof(terminate)),
+        )
+        return bool(event.value), bool(terminate.value)
+
+    def asked_to_stop(self) -> tuple[bool, float | None]:
+        """After fmi2Discard: whether the FMU wants to end, and the last time it reached (clause 4.2.3)."""
+        pointer = ctypes.c_void_p
+        terminated, last = ctypes.c_int(0), ctypes.c_double(np.nan)
+        boolean = self.library.function("fmi2GetBooleanStatus", pointer, ctypes.c_int, pointer)
+        real = self.library.function("fmi2GetRealStatus", pointer, ctypes.c_int, pointer)
+        ends = boolean(self.handle, 3, ctypes.addressof(terminated)) <= 1 and bool(terminated.value)
+        known = real(self.handle, 2, ctypes.addressof(last)) <= 1 and np.isfinite(last.value)
+        return ends, last.value if known else None
+
+
+_listener: list[Messages | None] = [None]
+"""Who hears the messages: there is one live instance per process."""
+
+
+def _log(_env: int, _name: bytes, status: int, category: bytes, message: bytes) -> None:
+    if _listener[0] is not None:
+        _listener[0].add(status, category, message)
+
+
+@cache
+def _shared_callbacks() -> _Callbacks:
+    """Callbacks of every instance; they live as long as the process, as late messages may come."""
+    libc = ctypes.CDLL("msvcrt") if hasattr(ctypes, "WinDLL") else ctypes.CDLL(None)
+    # The C library's own functions: no Python runs in an FMU's allocations.
+    allocate, free = (ctypes.cast(f, ctypes.c_void_p).value for f in (libc.calloc, libc.free))
+    callbacks = _Callbacks(_Logger(_log), allocate, free, None, None)
+    try:
+        # Python cannot read printf arguments; fmpy's C helper formats before our logger is called.
+        from fmpy.logging import addLoggerProxy
+    except Exception:  # no helper for this platform: messages keep their %s
+        return callbacks
+    addLoggerProxy(ctypes.addressof(callbacks))
+    return callbacks

@@ -1,0 +1,136 @@
+"""FMI 3.0 through ctypes (clauses 2.2, 3.2 and 4.2 of the FMI 3.0.2 standard)."""
+
+import ctypes
+import os
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from thsa_cosim.fmu.instance import EventInfo, Instance
+
+_Log = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
+
+
+class Fmi3Instance(Instance):
+    """One FMI 3.0 instance (Co-Simulation without Event Mode, or Model Exchange)."""
+
+    prefix = "fmi3"
+    types: ClassVar[dict[str, tuple[str, Any]]] = {
+        "Float64": ("Float64", np.float64),
+        "Float32": ("Float32", np.float32),
+        "Int8": ("Int8", np.int8),
+        "UInt8": ("UInt8", np.uint8),
+        "Int16": ("Int16", np.int16),
+        "UInt16": ("UInt16", np.uint16),
+        "Int32": ("Int32", np.int32),
+        "UInt32": ("UInt32", np.uint32),
+        "Int64": ("Int64", np.int64),
+        "UInt64": ("UInt64", np.uint64),
+        "Enumeration": ("Int64", np.int64),
+        "Boolean": ("Boolean", np.bool_),
+    }
+    environment = 0
+    """Address handed to the callbacks."""
+    intermediate_update = 0
+    """Address of the intermediate update callback, 0 for none."""
+    intermediate_references: Sequence[int] = ()
+    _log: Any = None
+
+    def instantiate(self) -> None:
+        """fmi3InstantiateCoSimulation or fmi3InstantiateModelExchange."""
+
+        def log(_env: int, status: int, category: bytes, message: bytes) -> None:
+            self.messages.add(status, category, message)
+
+        if self._log is None:
+            self._log = _Log(log)
+        pointer, boolean, text = ctypes.c_void_p, ctypes.c_bool, ctypes.c_char_p
+        resources = f"{self.resources}{os.sep}".encode() if self.resources.is_dir() else None
+        common = (b"plant", self.description.guid.encode(), resources, False, False)
+        if self.kind == "model-exchange":
+            function = self.library.function(
+                "fmi3InstantiateModelExchange",
+                text,
+                text,
+                text,
+                boolean,
+                boolean,
+                pointer,
+                _Log,
+                restype=pointer,
+            )
+            self.created(function(*common, None, self._log), "InstantiateModelExchange")
+            return
+        function = self.library.function(
+            "fmi3InstantiateCoSimulation",
+            text,
+            text,
+            text,
+            boolean,
+            boolean,
+            boolean,
+            boolean,
+            pointer,
+            ctypes.c_size_t,
+            pointer,
+            _Log,
+            pointer,
+            restype=pointer,
+        )
+        references = np.array(self.intermediate_references, dtype=np.uint32)
+        handle = function(
+            *common,
+            False,
+            False,
+            references.ctypes.data if len(references) else None,
+            len(references),
+            self.environment or None,
+            self._log,
+            self.intermediate_update or None,
+        )
+        self.created(handle, "InstantiateCoSimulation")
+
+    def initialize_begin(self, start: float, stop: float, tolerance: float | None) -> None:
+        """fmi3EnterInitializationMode."""
+        self.call(
+            "EnterInitializationMode",
+            (ctypes.c_bool, tolerance is not None),
+            (ctypes.c_double, tolerance or 0.0),
+            (ctypes.c_double, start),
+            (ctypes.c_bool, True),
+            (ctypes.c_double, stop),
+        )
+
+    def value_function(self, verb: str, suffix: str) -> Any:
+        """fmi3SetFloat64, fmi3GetInt32, ..."""
+        pointer, size = ctypes.c_void_p, ctypes.c_size_t
+        return self.library.function(f"fmi3{verb}{suffix}", pointer, pointer, size, pointer, size)
+
+    def access(self, function: Any, references: int, count: int, values: int) -> int:
+        """Set or get ``count`` scalar variables."""
+        return int(function(self.handle, references, count, values, count))
+
+    def event_iteration(self) -> EventInfo:
+        """fmi3UpdateDiscreteStates."""
+        flags = (ctypes.c_bool * 5)()
+        time = ctypes.c_double(np.nan)
+        base = ctypes.addressof(flags)
+        self.call(
+            "UpdateDiscreteStates",
+            *((ctypes.c_void_p, base + i) for i in range(5)),
+            (ctypes.c_void_p, ctypes.addressof(time)),
+        )
+        again, terminate, nominals, values, defined = flags
+        return EventInfo(again, terminate, nominals, values, time.value if defined else None)
+
+    def completed_integrator_step(self) -> tuple[bool, bool]:
+        """fmi3CompletedIntegratorStep."""
+        event, terminate = ctypes.c_bool(False), ctypes.c_bool(False)
+        self.call(
+            "CompletedIntegratorStep",
+            (ctypes.c_bool, True),
+            (ctypes.c_void_p, ctypes.addressof(event)),
+            (ctypes.c_void_p, ctypes.addressof(terminate)),
+        )
+        return event.value, terminate.value

@@ -1,0 +1,103 @@
+"""From sampled inputs to what an FMU is given at every communication point.
+
+Inputs are piecewise linear between the samples of a recording and constant outside of it. Between two
+communication points t_k and t_k+1 the FMU is given, best first:
+
+``derivative``
+    FMI 2.0 with ``canInterpolateInputs``: u(t_k) and the slope (u(t_k+1) - u(t_k)) / h by
+    fmi2SetRealInputDerivatives (clause 4.2.1). Exact where samples lie on communication points.
+``intermediate``
+    FMI 3.0 with intermediate update and inputs that allow it: u(t) whenever the FMU asks (clause 4.2.2).
+    Exact likewise.
+``mean``
+    Otherwise: the mean (u(t_k) + u(t_k+1)) / 2, held over the step, so that the states see the input
+    without delay (second order in h; holding u(t_k) would delay by h/2). Before the outputs at t_k+1
+    are read, the input is set to u(t_k+1), which keeps direct feed-through exact.
+
+Integer, Boolean and discrete inputs hold u(t_k) over the step, rounded to the nearest integer.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from thsa_cosim.errors import ParameterError
+from thsa_cosim.fmu.description import FmuDescription, Variable
+from thsa_cosim.signals import FloatArray, Signals
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Communication points: ``times`` (n,) and ``steps`` (n-1,) in s."""
+
+    times: FloatArray
+    steps: FloatArray
+
+    @property
+    def stop(self) -> float:
+        """Last communication point [s], not below what the steps add up to."""
+        reached = self.times[-2] + self.steps[-1] if len(self.times) > 1 else self.times[-1]
+        return float(max(self.times[-1], reached))
+
+
+def communication_grid(time: FloatArray) -> Grid:
+    """Return the communication points for output times ``time`` (n,) in s, strictly increasing.
+
+    Equally spaced times (to 1e-6 of the step) get one step size bit for bit: some FMUs refuse a step
+    that differs from the last in its last digit.
+    """
+    time = np.ascontiguousarray(time, dtype=np.float64)
+    if time.ndim != 1 or len(time) < 1 or not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():
+        raise ParameterError("The output times must be finite and strictly increasing, at least one of them.")
+    if len(time) < 3:
+        return Grid(time, np.diff(time))
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    even = time[0] + step * np.arange(len(time))
+    if np.max(np.abs(even - time)) <= 1e-6 * step:
+        return Grid(even, np.full(len(time) - 1, step))
+    return Grid(time, np.diff(time))
+
+
+def input_variables(description: FmuDescription, inputs: Signals | None) -> list[Variable]:
+    """Return the FMU's inputs that ``inputs`` drives; ParameterError for a name that is none."""
+    variables = []
+    for name in inputs.names if inputs is not None else ():
+        variable = description.variable(name)
+        if variable.causality != "input":
+            raise ParameterError(
+                f"{description.path}: {name} is no input but a {variable.causality}; "
+                f"inputs are {', '.join(v.name for v in description.inputs) or 'none'}."
+            )
+        variables.append(variable)
+    return variables
+
+
+def sampled(inputs: Signals | None, variables: Sequence[Variable], times: FloatArray) -> FloatArray:
+    """Return the inputs at ``times``: (n, inputs); linear for continuous Reals, held for all others."""
+    table = np.empty((len(times), len(variables)))
+    for column, variable in enumerate(variables):
+        assert inputs is not None
+        values = inputs[variable.name]
+        if variable.is_float and variable.variability == "continuous":
+            table[:, column] = np.interp(times, inputs.time, values)
+        else:
+            index = np.clip(np.searchsorted(inputs.time, times, side="right") - 1, 0, len(values) - 1)
+            held = values[index]
+            table[:, column] = held if variable.is_float else np.rint(held)
+    return table
+
+
+def input_mode(description: FmuDescription, variables: Sequence[Variable]) -> str:
+    """Return "derivative", "intermediate" or "mean": how continuous inputs are given (see the module)."""
+    continuous = [v for v in variables if v.is_float and v.variability == "continuous"]
+    if description.fmi_version == "2.0" and description.capabilities.get("canInterpolateInputs"):
+        return "derivative"
+    if (
+        description.fmi_version == "3.0"
+        and description.capabilities.get("providesIntermediateUpdate")
+        and continuous
+        and all(v.intermediate_update and v.type == "Float64" for v in continuous)
+    ):
+        return "intermediate"
+    return "mean"

@@ -1,0 +1,199 @@
+"""What FMI 2.0 and FMI 3.0 instances have in common, seen from the stepping loop and the integrator."""
+
+import ctypes
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thsa_cosim.errors import ParameterError
+from thsa_cosim.fmu.description import FmuDescription, Variable
+from thsa_cosim.fmu.failure import SimulationFailure, Status
+from thsa_cosim.fmu.native import Library, Messages, MessageSink, failure, library_path, load_library
+from thsa_cosim.signals import FloatArray
+
+
+class Phase(IntEnum):
+    """What a plant is doing, for whoever has to explain its death."""
+
+    IDLE = 0
+    LOAD = 1
+    INSTANTIATE = 2
+    INITIALIZE = 3
+    STEP = 4
+    TERMINATE = 5
+    FREE = 6
+    RESET = 7
+    REDUCE = 8
+
+
+@dataclass(frozen=True)
+class EventInfo:
+    """Result of an event iteration (Model Exchange)."""
+
+    needs_update: bool
+    terminate: bool
+    nominals_changed: bool
+    states_changed: bool
+    next_event_time: float | None
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Variables of one FMI data type: how they are set and got in one call."""
+
+    suffix: str
+    """Type in the function name: Real, Integer, Float64, ..."""
+    references: NDArray[np.uint32]
+    dtype: np.dtype[Any]
+    columns: tuple[int, ...]
+    """Position of each variable in the caller's list."""
+
+
+class Instance(ABC):
+    """One live instance; every failing call raises SimulationFailure."""
+
+    prefix: ClassVar[str]
+    types: ClassVar[dict[str, tuple[str, Any]]]
+    """FMI data type -> (function suffix, numpy type)"""
+
+    def __init__(
+        self, folder: Path, description: FmuDescription, kind: str, sink: MessageSink | None = None
+    ) -> None:
+        self.description = description
+        self.kind = kind
+        self.messages = Messages(sink)
+        identifier = (
+            description.co_simulation_identifier
+            if kind == "co-simulation"
+            else description.model_exchange_identifier
+        )
+        self.library: Library = load_library(library_path(folder, description, identifier or ""))
+        self.resources = folder / "resources"
+        self.handle = 0
+        self.is_dead = False
+        """After fmiXFatal nothing may be called any more, not even FreeInstance."""
+
+    # -- what the two versions do differently -------------------------------------------------------
+    @abstractmethod
+    def instantiate(self) -> None:
+        """Create the instance."""
+
+    @abstractmethod
+    def initialize_begin(self, start: float, stop: float, tolerance: float | None) -> None:
+        """Enter Initialization Mode."""
+
+    @abstractmethod
+    def event_iteration(self) -> EventInfo:
+        """Call newDiscreteStates / updateDiscreteStates once."""
+
+    @abstractmethod
+    def completed_integrator_step(self) -> tuple[bool, bool]:
+        """Return (enter event mode, terminate)."""
+
+    @abstractmethod
+    def value_function(self, verb: str, suffix: str) -> Any:
+        """Return the C function that sets or gets (``verb``) variables of one type."""
+
+    @abstractmethod
+    def access(self, function: Any, references: int, count: int, values: int) -> int:
+        """Call a function from ``value_function`` on addresses; return its status code."""
+
+    # -- what they do alike -------------------------------------------------------------------------
+    def call(self, name: str, *arguments: tuple[Any, Any], time: float | None = None) -> None:
+        """Call ``<prefix><name>(instance, ...)`` with (ctype, value) pairs and check its status."""
+        function = self.library.function(self.prefix + name, ctypes.c_void_p, *(t for t, _ in arguments))
+        self.check(function(self.handle, *(v for _, v in arguments)), name, time)
+
+    def check(self, code: int, name: str, time: float | None = None) -> None:
+        """Raise SimulationFailure for a status code other than OK and Warning."""
+        if code in (0, 1):
+            return
+        if code == 4:
+            self.is_dead = True
+        raise failure(self.prefix, name, code, self.messages, time)
+
+    def channels(self, variables: Sequence[Variable]) -> list[Channel]:
+        """Group ``variables`` by FMI data type; ParameterError for a type that holds no number."""
+        groups: dict[str, list[int]] = {}
+        for column, variable in enumerate(variables):
+            if variable.type not in self.types or variable.is_array:
+                what = "an array" if variable.is_array else f"of type {variable.type}"
+                raise ParameterError(
+                    f"{self.description.path}: {variable.name} is {what}; only numbers can be used."
+                )
+            groups.setdefault(self.types[variable.type][0], []).append(column)
+        dtypes = {suffix: np.dtype(dtype) for suffix, dtype in self.types.values()}
+        return [
+            Channel(
+                suffix,
+                np.array([variables[c].value_reference for c in columns], dtype=np.uint32),
+                dtypes[suffix],
+                tuple(columns),
+            )
+            for suffix, columns in groups.items()
+        ]
+
+    def set_values(self, channels: Sequence[Channel], values: FloatArray) -> None:
+        """Set variables to ``values`` (n,), one C call per data type."""
+        for channel in channels:
+            data = np.ascontiguousarray(values[list(channel.columns)]).astype(channel.dtype)
+            function = self.value_function("Set", channel.suffix)
+            code = self.access(function, channel.references.ctypes.data, len(data), data.ctypes.data)
+            self.check(code, f"Set{channel.suffix}")
+
+    def get_values(self, channels: Sequence[Channel], out: FloatArray) -> None:
+        """Read variables into ``out`` (n,), one C call per data type."""
+        for channel in channels:
+            data = np.empty(len(channel.references), dtype=channel.dtype)
+            function = self.value_function("Get", channel.suffix)
+            code = self.access(function, channel.references.ctypes.data, len(data), data.ctypes.data)
+            self.check(code, f"Get{channel.suffix}")
+            out[list(channel.columns)] = data
+
+    def initialize_end(self) -> None:
+        """Leave Initialization Mode."""
+        self.call("ExitInitializationMode")
+
+    def terminate(self) -> None:
+        """End the run."""
+        self.call("Terminate")
+
+    def reset(self) -> None:
+        """Bring the instance back to the state after instantiation."""
+        self.call("Reset")
+
+    def free(self) -> None:
+        """Destroy the instance (nothing happens if there is none or it is dead)."""
+        if self.handle and not self.is_dead:
+            self.library.function(f"{self.prefix}FreeInstance", ctypes.c_void_p, restype=None)(self.handle)
+        self.handle = 0
+
+    def created(self, handle: int | None, name: str) -> None:
+        """Take the handle that ``name`` returned."""
+        if not handle:
+            reason = f"{self.prefix}{name} returned NULL{self.messages.last()}"
+            raise SimulationFailure(Status.LOAD_ERROR, reason)
+        self.handle = handle
+
+    # -- Model Exchange ------------------------------------------------------------------------------
+    def set_time(self, time: float) -> None:
+        """Set the independent variable [s]."""
+        self.call("SetTime", (ctypes.c_double, time))
+
+    def enter_event_mode(self) -> None:
+        """Enter Event Mode."""
+        self.call("EnterEventMode")
+
+    def enter_continuous_time_mode(self) -> None:
+        """Enter Continuous-Time Mode."""
+        self.call("EnterContinuousTimeMode")
+
+    def vector(self, name: str, values: FloatArray) -> None:
+        """Call a function that reads or writes a vector of Reals, e.g. GetContinuousStates."""
+        self.call(name, (ctypes.c_void_p, values.ctypes.data), (ctypes.c_size_t, len(values)))

@@ -1,0 +1,285 @@
+"""An opened FMU that can be run again and again."""
+
+import importlib
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+
+from thsa_cosim.errors import FmuError
+from thsa_cosim.fmu.archive import unpack
+from thsa_cosim.fmu.description import FmuDescription, read_description
+from thsa_cosim.fmu.fmi2 import Fmi2Instance
+from thsa_cosim.fmu.fmi3 import Fmi3Instance
+from thsa_cosim.fmu.instance import Instance, Phase
+from thsa_cosim.fmu.native import MessageSink
+from thsa_cosim.fmu.stepping import IntermediateUpdate, Plan, check_names, step_through
+from thsa_cosim.signals import FloatArray, Signals
+
+Kind = Literal["co-simulation", "model-exchange"]
+Backend = Literal["compiled", "python"]
+Reuse = Literal["fresh", "reset"]
+
+_PLANS = 64
+
+
+class Plant:
+    """An opened FMU: owns its unpacked folder and at most one live instance.
+
+    Use it as a context manager. It is not safe against an FMU that crashes or hangs: runners put it into
+    a process of its own. Open one Plant at a time per process: many FMUs corrupt each other's instances.
+    """
+
+    def __init__(
+        self,
+        description: FmuDescription,
+        folder: Path,
+        *,
+        kind: Kind | None = None,
+        backend: Backend | None = None,
+        reuse: Reuse = "fresh",
+        owns_folder: bool = False,
+        progress: FloatArray | None = None,
+        on_message: MessageSink | None = None,
+    ) -> None:
+        """Take an FMU that is already unpacked into ``folder``; ``Plant.open`` is the usual way in.
+
+        ``progress`` (4,) is written while running: phase, time [s], step, unused.
+        """
+        self.description = description
+        self.folder = folder
+        self.kind: Kind = kind or (
+            "co-simulation" if description.supports_co_simulation else "model-exchange"
+        )
+        supported = {
+            "co-simulation": description.supports_co_simulation,
+            "model-exchange": description.supports_model_exchange,
+        }
+        if not supported[self.kind]:
+            other = next(k for k, yes in supported.items() if yes)
+            raise FmuError(f"{description.path} does not support {self.kind}; open it with kind={other!r}.")
+        if description.fmi_version == "1.0" and self.kind == "model-exchange":
+            raise FmuError(
+                f"{description.path} is FMI 1.0 Model Exchange, which is not supported; export FMI 2.0."
+            )
+        self.backend: Backend = backend or _default_backend()
+        self.reuse: Reuse = reuse
+        self.progress = np.zeros(4) if progress is None else progress
+        self._owns_folder = owns_folder
+        self._on_message = on_message
+        self._instance: Instance | None = None
+        self._plans: dict[Any, tuple[Any, Any]] = {}
+        self._update: IntermediateUpdate | None = None
+
+    @classmethod
+    def open(
+        cls,
+        path: Path | str,
+        *,
+        kind: Kind | None = None,
+        backend: Backend | None = None,
+        reuse: Reuse = "fresh",
+        on_message: MessageSink | None = None,
+    ) -> "Plant":
+        """Read and unpack the FMU ``path`` into a temporary folder, which ``close`` removes.
+
+        Parameters
+        ----------
+        kind
+            Co-Simulation unless the FMU has Model Exchange only.
+        backend
+            "compiled" (numba) or "python", the reference; both give the same bits.
+        reuse
+            "fresh": a new instance per run. "reset": one instance, fmiXReset between runs; only for FMUs
+            whose reset is known to be right (``thsa-cosim check``).
+        on_message
+            Called with each line that the FMU logs.
+
+        Raises
+        ------
+        FmuError
+            If the file is no usable FMU or lacks ``kind``.
+        """
+        description = read_description(path)
+        folder = Path(tempfile.mkdtemp(prefix="thsa-cosim-plant-"))
+        try:
+            unpack(Path(path), folder)
+            return cls(
+                description,
+                folder,
+                kind=kind,
+                backend=backend,
+                reuse=reuse,
+                owns_folder=True,
+                on_message=on_message,
+            )
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+
+    def run(
+        self,
+        values: Mapping[str, float],
+        inputs: Signals | None,
+        outputs: Sequence[str],
+        time: FloatArray,
+        *,
+        tolerance: float | None = None,
+    ) -> Signals:
+        """Simulate once.
+
+        Parameters
+        ----------
+        values
+            Start values by variable name, in the FMU's units, set before initialisation.
+        inputs
+            Input signals in the FMU's units, interpolated linearly (see ``thsa_cosim.fmu.inputs``); inputs
+            left out keep their start value.
+        outputs
+            Names of the variables to record; any causality.
+        time
+            (n,) s, strictly increasing: communication points and output times. ``time[0]`` is the start;
+            the first values are those after initialisation with the inputs at ``time[0]``.
+        tolerance
+            Relative tolerance for the FMU's solver (or, in Model Exchange, ours); ``None``: its default.
+
+        Returns
+        -------
+        Signals
+            The outputs at ``time``.
+
+        Raises
+        ------
+        SimulationFailure
+            If the run fails; ``status`` and ``reason`` say how.
+        ParameterError, FmuError
+            If a name is unknown or cannot be set or driven.
+        """
+        if self.description.fmi_version == "1.0":
+            from thsa_cosim.fmu.fmi1 import run_fmi1
+
+            return run_fmi1(self.folder, self.description, values, inputs, outputs, time, self.progress)
+        try:
+            result = self._run(values, inputs, outputs, time, tolerance)
+        except BaseException:
+            self._free()
+            raise
+        if self.reuse == "fresh":
+            self._free()
+        self.progress[0] = Phase.IDLE
+        return result
+
+    def _run(
+        self,
+        values: Mapping[str, float],
+        inputs: Signals | None,
+        outputs: Sequence[str],
+        time: FloatArray,
+        tolerance: float | None,
+    ) -> Signals:
+        instance = self._instance
+        if instance is None:
+            self.progress[0] = Phase.LOAD
+            instance = self._new_instance()
+            self._instance = instance
+        plan = self._plan(instance, inputs, outputs, time)
+        names = tuple(values)
+        settable = self._cached(("values", names), lambda: self._settable(instance, names))
+        instance.messages.clear()
+        self.progress[1] = plan.grid.times[0]
+        if instance.handle:
+            self.progress[0] = Phase.RESET
+            instance.reset()
+        else:
+            self.progress[0] = Phase.INSTANTIATE
+            self._prepare_callback(instance, plan)
+            instance.instantiate()
+            if self._update is not None:
+                self._update.block[1] = instance.handle
+        self.progress[0] = Phase.INITIALIZE
+        instance.set_values(settable, np.fromiter((float(values[n]) for n in names), float, len(names)))
+        start, stop = float(plan.grid.times[0]), plan.grid.stop
+        if self.kind == "model-exchange":
+            from thsa_cosim.fmu.exchange import integrate
+
+            return integrate(instance, plan, self.progress, tolerance)
+        instance.initialize_begin(start, stop, tolerance)
+        instance.set_values(plan.input_channels, plan.first)
+        instance.initialize_end()
+        signals = step_through(instance, plan, self.progress, self.backend == "compiled")
+        self.progress[0] = Phase.TERMINATE
+        instance.terminate()
+        return signals
+
+    def _new_instance(self) -> Instance:
+        cls = Fmi2Instance if self.description.fmi_version == "2.0" else Fmi3Instance
+        return cls(self.folder, self.description, self.kind, self._on_message)
+
+    def _settable(self, instance: Instance, names: Sequence[str]) -> Any:
+        check_names(names, instance)
+        return instance.channels([self.description.variable(name) for name in names])
+
+    def _plan(
+        self, instance: Instance, inputs: Signals | None, outputs: Sequence[str], time: FloatArray
+    ) -> Plan:
+        """Return the prepared experiment; recognised by identity, so pass the same objects again."""
+        key = ("plan", id(inputs), id(time), tuple(outputs))
+        plan: Plan = self._cached(key, lambda: Plan(instance, inputs, outputs, time), keep=(inputs, time))
+        return plan
+
+    def _cached(self, key: Any, make: Any, keep: Any = None) -> Any:
+        if key not in self._plans:
+            while len(self._plans) >= _PLANS:
+                del self._plans[next(iter(self._plans))]
+            # `keep` holds the objects whose ids are in the key, so that no id is given to another object.
+            self._plans[key] = (make(), keep)
+        return self._plans[key][0]
+
+    def _prepare_callback(self, instance: Instance, plan: Plan) -> None:
+        if not isinstance(instance, Fmi3Instance) or self.kind != "co-simulation":
+            return
+        if plan.mode != "intermediate" or plan.smooth is None:
+            instance.intermediate_update, instance.intermediate_references = 0, ()
+            self._update = None
+            return
+        self._update = IntermediateUpdate(instance, self.progress, self.backend == "compiled")
+        self._update.prepare(plan, instance)
+
+    def _free(self) -> None:
+        if self._instance is None or not self._instance.handle:
+            return
+        self.progress[0] = Phase.FREE
+        self._instance.free()
+
+    @property
+    def is_dead(self) -> bool:
+        """Whether the FMU reported a fatal error: its process must not use it any more."""
+        return self._instance is not None and self._instance.is_dead
+
+    def close(self) -> None:
+        """Free the instance and remove the folder if this object unpacked it."""
+        self._free()
+        self._instance = None
+        self._plans.clear()
+        if self._owns_folder:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _default_backend() -> Backend:
+    try:
+        importlib.import_module("thsa_cosim.fmu.compiled")
+    except Exception:  # numba missing or broken: slower, the same numbers
+        return "python"
+    return "compiled"

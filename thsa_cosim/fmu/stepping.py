@@ -1,0 +1,344 @@
+"""Co-Simulation of FMI 2.0 and 3.0: set inputs, do a step, get outputs.
+
+``Plan`` holds everything that is the same in every run of one experiment (tables of input values and
+of addresses); ``step_through`` runs it. Two loops do the same calls in the same order: machine code
+(``compiled.advance``) and ``advance_python``, the reference, which it equals bit for bit.
+"""
+
+import ctypes
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thsa_cosim.errors import ParameterError
+from thsa_cosim.fmu.failure import SimulationFailure, Status
+from thsa_cosim.fmu.fmi2 import Fmi2Instance
+from thsa_cosim.fmu.fmi3 import Fmi3Instance
+from thsa_cosim.fmu.inputs import communication_grid, input_mode, input_variables, sampled
+from thsa_cosim.fmu.instance import Channel, Instance, Phase
+from thsa_cosim.signals import FloatArray, Signals
+
+IntArray = NDArray[np.int64]
+
+_INT, _DOUBLE, _SIZE = ctypes.c_int, ctypes.c_double, ctypes.c_int64
+_ACCESS2 = ctypes.CFUNCTYPE(_INT, _SIZE, _SIZE, _SIZE, _SIZE)
+_ACCESS3 = ctypes.CFUNCTYPE(_INT, _SIZE, _SIZE, _SIZE, _SIZE, _SIZE)
+_STEP2 = ctypes.CFUNCTYPE(_INT, _SIZE, _DOUBLE, _DOUBLE, _INT)
+_STEP3 = ctypes.CFUNCTYPE(_INT, _SIZE, _DOUBLE, _DOUBLE, ctypes.c_bool, _SIZE, _SIZE, _SIZE, _SIZE)
+_UPDATE = ctypes.CFUNCTYPE(
+    None,
+    ctypes.c_void_p,
+    _DOUBLE,
+    ctypes.c_bool,
+    ctypes.c_bool,
+    ctypes.c_bool,
+    ctypes.c_bool,
+    _SIZE,
+    _SIZE,
+)
+
+
+def advance_python(
+    version: int,
+    handle: int,
+    do_step: int,
+    times: FloatArray,
+    steps: FloatArray,
+    sets: IntArray,
+    slopes: IntArray,
+    ends: IntArray,
+    gets: IntArray,
+    floats: FloatArray,
+    flags: NDArray[np.uint8],
+    last: FloatArray,
+    progress: FloatArray,
+) -> tuple[int, int, int]:
+    """Step through ``times`` (n,); return (steps done, what ended the loop, its code).
+
+    ``sets``, ``ends`` and ``gets`` have one row per data type: address of the C function, address of the
+    value references, their count, address of the value table, bytes per table row. ``slopes`` is one such
+    row for fmi2SetRealInputDerivatives (function, references, count, orders, table, row bytes), zero for
+    none. What ends it: 0 finished, 1 set, 2 slopes, 3 doStep, 4 set at the end of the step, 5 get,
+    6 output number ``code`` is not finite, 7 the FMU asks to terminate, 8 the FMU fell short of the step.
+    """
+
+    def bind(rows: IntArray) -> list[tuple[Any, ...]]:
+        prototype = _ACCESS2 if version == 2 else _ACCESS3
+        return [(prototype(row[0]), *row[1:]) for row in rows.tolist()]
+
+    def access(row: tuple[Any, ...], k: int) -> int:
+        function, references, count, table, stride = row
+        rest = () if version == 2 else (count,)
+        return int(function(handle, references, count, table + k * stride, *rest))
+
+    set_rows, end_rows, get_rows = bind(sets), bind(ends), bind(gets)
+    slope = slopes.tolist()
+    set_slopes = _ACCESS3(slope[0]) if slope[0] else None
+    step = _STEP2(do_step) if version == 2 else _STEP3(do_step)
+    flag = flags.ctypes.data
+    for k in range(len(steps)):
+        progress[1] = times[k]
+        for row in set_rows:
+            if (code := access(row, k)) not in (0, 1):
+                return k, 1, code
+        if set_slopes:
+            code = set_slopes(handle, slope[1], slope[2], slope[3], slope[4] + k * slope[5])
+            if code not in (0, 1):
+                return k, 2, code
+        progress[2] = k
+        if version == 2:
+            code = step(handle, times[k], steps[k], 1)
+        else:
+            flags[1] = 0
+            last[0] = np.nan
+            code = step(handle, times[k], steps[k], True, flag, flag + 1, flag + 2, last.ctypes.data)
+        if code not in (0, 1):
+            return k, 3, code
+        if version == 3:
+            if flags[1]:
+                return k, 7, 0
+            if last[0] < times[k] + 0.999 * steps[k]:
+                return k, 8, 0
+        for row in end_rows:
+            if (code := access(row, k + 1)) not in (0, 1):
+                return k, 4, code
+        for row in get_rows:
+            if (code := access(row, k + 1)) not in (0, 1):
+                return k, 5, code
+        finite = np.isfinite(floats[k + 1])
+        if not finite.all():
+            return k, 6, int(np.argmin(finite))
+    return len(steps), 0, 0
+
+
+class Plan:
+    """One experiment prepared for one instance: communication points, input tables, output channels."""
+
+    def __init__(
+        self, instance: Instance, inputs: Signals | None, outputs: Sequence[str], time: FloatArray
+    ) -> None:
+        description = instance.description
+        self.grid = communication_grid(time)
+        self.outputs = tuple(outputs)
+        variables = input_variables(description, inputs)
+        self.input_channels = instance.channels(variables)
+        output_variables = [description.variable(name) for name in outputs]
+        self.output_channels = instance.channels(output_variables)
+        self.units = {v.name: v.unit or "1" for v in output_variables}
+        self.mode = input_mode(description, variables)
+        table = sampled(inputs, variables, self.grid.times)
+        self.first = table[0] if variables else np.empty(0)
+        continuous = np.array([v.is_float and v.variability == "continuous" for v in variables], dtype=bool)
+        moves = bool(continuous.any()) and bool((table[1:] != table[:-1])[:, continuous].any())
+        self.begin = self._rows(self._at_begin(table, continuous))
+        self.end = self._rows(self._at_end(table, continuous)) if self.mode != "derivative" and moves else []
+        self.smooth = self._smooth_channel(table, continuous) if moves and self.mode != "mean" else None
+
+    def _at_begin(self, table: FloatArray, continuous: NDArray[np.bool_]) -> FloatArray:
+        if self.mode != "mean":
+            return table
+        mean = table.copy()
+        mean[:-1, continuous] = 0.5 * (table[:-1, continuous] + table[1:, continuous])
+        return mean
+
+    @staticmethod
+    def _at_end(table: FloatArray, continuous: NDArray[np.bool_]) -> FloatArray:
+        end = table.copy()
+        end[1:, ~continuous] = table[:-1, ~continuous]
+        return end
+
+    def _rows(self, table: FloatArray) -> list[tuple[Channel, NDArray[Any]]]:
+        """One contiguous (n, variables) table per data type."""
+        return [
+            (channel, np.ascontiguousarray(table[:, list(channel.columns)].astype(channel.dtype)))
+            for channel in self.input_channels
+        ]
+
+    def _smooth_channel(
+        self, table: FloatArray, continuous: NDArray[np.bool_]
+    ) -> tuple[Channel, FloatArray, FloatArray, NDArray[np.int32]] | None:
+        """Continuous double inputs: channel, values (n, m), slopes (n-1, m), derivative orders (m,)."""
+        for channel in self.input_channels:
+            if channel.suffix not in ("Real", "Float64"):
+                continue
+            inside = [i for i, c in enumerate(channel.columns) if continuous[c]]
+            columns = [channel.columns[i] for i in inside]
+            values = np.ascontiguousarray(table[:, columns])
+            slopes = np.ascontiguousarray(np.diff(values, axis=0) / self.grid.steps[:, None])
+            part = Channel(channel.suffix, channel.references[inside], channel.dtype, tuple(columns))
+            return part, values, slopes, np.ones(len(inside), dtype=np.int32)
+        return None
+
+
+def _address_table(instance: Instance, verb: str, rows: Sequence[tuple[Channel, NDArray[Any]]]) -> IntArray:
+    table = np.zeros((len(rows), 5), dtype=np.int64)
+    for i, (channel, values) in enumerate(rows):
+        function = instance.library.address(instance.value_function(verb, channel.suffix))
+        references = channel.references.ctypes.data
+        table[i] = function, references, len(channel.references), values.ctypes.data, values.strides[0]
+    return table
+
+
+class IntermediateUpdate:
+    """The block of addresses that an FMI 3 intermediate update callback reads, and the callback."""
+
+    def __init__(self, instance: Fmi3Instance, progress: FloatArray, compiled: bool) -> None:
+        self.block = np.zeros(9, dtype=np.int64)
+        self.block[7] = progress.ctypes.data
+        self._progress = progress
+        self._python = _UPDATE(self._update)
+        if compiled:
+            from thsa_cosim.fmu.compiled import intermediate_update
+
+            instance.intermediate_update = intermediate_update.address
+        else:
+            instance.intermediate_update = instance.library.address(self._python)
+        instance.environment = self.block.ctypes.data
+
+    def prepare(self, plan: Plan, instance: Fmi3Instance) -> None:
+        """Point the block at the tables of ``plan``; before instantiation."""
+        assert plan.smooth is not None
+        channel, values, slopes, _ = plan.smooth
+        setter = instance.library.address(instance.value_function("Set", channel.suffix))
+        references = channel.references
+        self.block[:7] = (
+            setter,
+            0,
+            references.ctypes.data,
+            len(references),
+            values.ctypes.data,
+            slopes.ctypes.data,
+            values.strides[0],
+        )
+        self.block[8] = plan.grid.times.ctypes.data
+        self._plan = plan
+        instance.intermediate_references = references.tolist()
+
+    def _update(
+        self, _environment: int, time: float, wanted: bool, _g: bool, _f: bool, _c: bool, early: int, _t: int
+    ) -> None:
+        if early:
+            ctypes.c_bool.from_address(early).value = False
+        if not wanted or self._progress[0] != Phase.STEP:
+            return
+        assert self._plan.smooth is not None
+        k = int(self._progress[2])
+        _, values, slopes, _ = self._plan.smooth
+        now = values[k] + slopes[k] * (time - self._plan.grid.times[k])
+        setter, handle, references, count = self.block[:4].tolist()
+        _ACCESS3(setter)(handle, references, count, now.ctypes.data, count)
+
+
+def step_through(instance: Instance, plan: Plan, progress: FloatArray, compiled: bool) -> Signals:
+    """Run an initialised instance through ``plan``; SimulationFailure if it does not reach the end."""
+    n = len(plan.grid.times)
+    version = 2 if instance.prefix == "fmi2" else 3
+    results = [
+        (channel, np.full((n, len(channel.references)), np.nan).astype(channel.dtype))
+        if channel.dtype.kind == "f"
+        else (channel, np.zeros((n, len(channel.references)), dtype=channel.dtype))
+        for channel in plan.output_channels
+    ]
+    doubles = [table for channel, table in results if channel.dtype == np.float64]
+    floats = doubles[0] if doubles else np.empty((n, 0))
+    gets = _address_table(instance, "Get", results)
+    slopes = np.zeros(6, dtype=np.int64)
+    if plan.smooth is not None and plan.mode == "derivative":
+        channel, _, table, orders = plan.smooth
+        pointer = ctypes.c_void_p
+        prototype = (pointer, pointer, ctypes.c_size_t, pointer, pointer)
+        function = instance.library.function("fmi2SetRealInputDerivatives", *prototype)
+        address, references = instance.library.address(function), channel.references
+        row = address, references.ctypes.data, len(references), orders.ctypes.data
+        slopes[:] = *row, table.ctypes.data, table.strides[0]
+    sets, ends = _address_table(instance, "Set", plan.begin), _address_table(instance, "Set", plan.end)
+    for (channel, _), row in zip(results, gets.tolist(), strict=True):
+        getter = instance.value_function("Get", channel.suffix)
+        instance.check(instance.access(getter, row[1], row[2], row[3]), f"Get{channel.suffix}")
+    _refuse_not_finite(plan, results, 0)
+    do_step = instance.library.address(instance.library.function(f"{instance.prefix}DoStep"))
+    progress[0] = Phase.STEP
+    if compiled:
+        from thsa_cosim.fmu.compiled import advance as loop
+    else:
+        loop = advance_python
+    done, what, code = loop(
+        version,
+        instance.handle,
+        do_step,
+        plan.grid.times,
+        plan.grid.steps,
+        sets,
+        slopes,
+        ends,
+        gets,
+        floats,
+        np.zeros(8, dtype=np.uint8),
+        np.zeros(1),
+        progress,
+    )
+    if what:
+        _explain(instance, plan, results, int(done), int(what), int(code))
+    for k in range(n):
+        if all(table.dtype.kind != "f" or table is floats for _, table in results):
+            break
+        _refuse_not_finite(plan, results, k)
+    values: dict[str, FloatArray] = {}
+    for channel, table in results:
+        for i, column in enumerate(channel.columns):
+            values[plan.outputs[column]] = np.ascontiguousarray(table[:, i], dtype=np.float64)
+    return Signals(plan.grid.times, {name: values[name] for name in plan.outputs}, plan.units)
+
+
+def _refuse_not_finite(plan: Plan, results: Sequence[tuple[Channel, NDArray[Any]]], k: int) -> None:
+    for channel, table in results:
+        if table.dtype.kind == "f" and not np.isfinite(table[k]).all():
+            i = int(np.argmin(np.isfinite(table[k])))
+            name = plan.outputs[channel.columns[i]]
+            reason = f"{name} became {table[k, i]} at t = {plan.grid.times[k]:.9g} s"
+            raise SimulationFailure(Status.NOT_FINITE, reason)
+
+
+_FUNCTIONS = {1: "Set{}", 2: "SetRealInputDerivatives", 3: "DoStep", 4: "Set{}", 5: "Get{}"}
+
+
+def _explain(
+    instance: Instance,
+    plan: Plan,
+    results: Sequence[tuple[Channel, NDArray[Any]]],
+    done: int,
+    what: int,
+    code: int,
+) -> None:
+    """Raise SimulationFailure for what ended the loop."""
+    time = float(plan.grid.times[done])
+    if what == 6:
+        _refuse_not_finite(plan, results, done + 1)
+    if what == 3 and code == 2 and isinstance(instance, Fmi2Instance):
+        terminated, last = instance.asked_to_stop()
+        if terminated:
+            at = time if last is None else last
+            raise SimulationFailure(
+                Status.INCOMPLETE,
+                f"the FMU ended the simulation at t = {at:.9g} s of {plan.grid.times[-1]:.9g} s"
+                f"{instance.messages.last()}",
+            )
+    if what in (7, 8):
+        verb = "ended the simulation" if what == 7 else "did less than the communication step"
+        reason = f"the FMU {verb} at t = {time:.9g} s of {plan.grid.times[-1]:.9g} s"
+        raise SimulationFailure(Status.INCOMPLETE, reason + instance.messages.last())
+    suffix = {channel.suffix for channel, _ in (plan.begin if what in (1, 4) else results)}
+    instance.check(code, _FUNCTIONS[what].format("/".join(sorted(suffix))), time)
+
+
+def check_names(values: Sequence[str], plan_owner: Instance) -> None:
+    """ParameterError for a name that cannot be set before initialisation (unknown, constant, text)."""
+    for name in values:
+        variable = plan_owner.description.variable(name)
+        if variable.variability == "constant" or variable.causality in ("independent", "calculatedParameter"):
+            raise ParameterError(
+                f"{plan_owner.description.path}: {name} is a {variable.variability} "
+                f"{variable.causality} and cannot be set; name a parameter or a start value."
+            )

@@ -1,0 +1,278 @@
+"""Text tables as laboratories write them, LabVIEW measurement files (.lvm) among them.
+
+Found out, not asked for: encoding (UTF-8 with or without BOM, UTF-16, Windows-1252), delimiter (tab ; , |
+blanks), decimal point or comma, comment lines (# % //), lines before the header, a row of units under it or
+units in it (``v [mm/s]``).
+"""
+
+import csv
+import io
+import re
+import warnings
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from thsa_cosim.errors import RecordingError
+from thsa_cosim.recordings.table import Choose, RawColumn, numeric, split_unit
+from thsa_cosim.signals import FloatArray
+from thsa_cosim.units import is_unit
+
+_DELIMITERS = ("\t", ";", ",", "|", " ")
+_COMMENTS = ("#", "%", "//")
+_MISSING = (
+    "",
+    "nan",
+    "na",
+    "n/a",
+    "null",
+    "none",
+    "-",
+    "--",
+    "#n/a",
+    "1.#qnan",
+    "-1.#ind",
+    "inf",
+    "-inf",
+    "+inf",
+)
+_NAN_WORDS = ["-", "--", "1.#QNAN", "-1.#IND", "1.#IND", "n/a", "#N/A"]
+_NUMBER = {
+    mark: re.compile(rf"[+-]?(\d+({re.escape(mark)}\d*)?|{re.escape(mark)}\d+)([eE][+-]?\d+)?")
+    for mark in ".,"
+}
+_STAMP = re.compile(r"\d{4}-\d\d-\d\d([ T]\d\d:\d\d.*)?|\d+:\d\d:\d\d.*")
+
+
+@dataclass(frozen=True)
+class _Layout:
+    delimiter: str
+    decimal: str
+    width: int
+    header: list[str]
+    units: list[str]
+    first: int  # index of the first line with data
+    step: tuple[float, float] | None = None  # LabVIEW without time column: (start, step) in s
+
+
+def read(path: Path, choose: Choose) -> dict[str, RawColumn]:
+    """Read the columns that ``choose`` picks.
+
+    Raises
+    ------
+    RecordingError
+        If the file is no text, holds no table with two columns of numbers or more, or a row is too long.
+    """
+    numbered = _lines(path)
+    layout = _layout(path, numbered)
+    rows = [(number, line) for number, line in numbered[layout.first :] if not line.startswith(_COMMENTS)]
+    chosen = list(dict.fromkeys(choose([name for name in layout.header if name])))
+    frame = _parse(path, rows, layout)
+    columns: dict[str, RawColumn] = {}
+    for name in chosen:
+        k = layout.header.index(name)
+        column = _column(frame[k], [number for number, _ in rows])
+        unit = layout.units[k] if k < len(layout.units) and layout.units[k] else split_unit(name)[1]
+        time: FloatArray | None = None
+        if layout.step is not None:
+            time = layout.step[0] + layout.step[1] * np.arange(len(rows))
+        columns[name] = RawColumn(column.values, column.unit or unit, time, column.problem)
+    return columns
+
+
+def _lines(path: Path) -> list[tuple[int, str]]:
+    """Return the numbered lines that are not blank."""
+    content = path.read_bytes()
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        text = content.decode("utf-16", "replace")
+    else:
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("cp1252", "replace")
+    if "\0" in text:
+        raise RecordingError(f"{path}: is binary, not a text table; check its format and ending.")
+    lines = re.split(r"\r\n|\n|\r", text)
+    return [(k, line) for k, line in enumerate(lines, start=1) if line.strip(" \t;,")]
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        return line.split()
+    if '"' in line:
+        cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+    else:
+        cells = line.split(delimiter)
+    return [cell.strip() for cell in cells]
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    return _NUMBER[decimal].fullmatch(cell) is not None
+
+
+def _layout(path: Path, numbered: list[tuple[int, str]]) -> _Layout:
+    lines = [line for _, line in numbered]
+    if any(line.startswith("***End_of_Header***") for line in lines[:100]):
+        return _labview_layout(path, lines)
+    offset, forced = 0, None
+    if lines and (match := re.fullmatch(r"sep=(.)", lines[0].strip().lower())):  # Excel's own hint
+        offset, forced = 1, match[1]
+    delimiter, decimal, width = _dialect(path, lines[offset:], (forced,) if forced else _DELIMITERS)
+    return _find_header(path, lines, offset, delimiter, decimal, width)
+
+
+def _dialect(path: Path, lines: Sequence[str], delimiters: Sequence[str]) -> tuple[str, str, int]:
+    """Return delimiter, decimal mark and number of columns that make most cells numbers."""
+    body = [line for line in lines if not line.startswith(_COMMENTS)]
+    # The header is short and the table long: the second half is data, a sample of it will do.
+    half = body[len(body) // 2 :]
+    sample = half[:: max(1, len(half) // 200)]
+    quoted = any('"' in line for line in sample)
+    best: tuple[float, str, str, int] = (0.0, "", "", 0)
+    for delimiter in delimiters:
+        rows = [_split(line, delimiter) for line in sample]
+        width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
+        if width < 2:
+            continue
+        for decimal in ".,":
+            if decimal == delimiter and not quoted:
+                continue
+            cells = sum(len(row) for row in rows)
+            numbers = sum(_is_number(cell, decimal) for row in rows if len(row) == width for cell in row)
+            if numbers / cells > best[0]:
+                best = (numbers / cells, delimiter, decimal, width)
+    if best[3] == 0:
+        raise RecordingError(
+            f"{path}: holds no table of numbers with two columns or more; export it as text with a header row."
+        )
+    return best[1:]
+
+
+def _find_header(
+    path: Path, lines: Sequence[str], offset: int, delimiter: str, decimal: str, width: int
+) -> _Layout:
+    """Find the first row of data, the names above it and the units between."""
+    above: list[list[str]] = []
+    first = len(lines)
+    for k in range(offset, len(lines)):
+        line = lines[k]
+        comment = line.startswith(_COMMENTS)
+        cells = _split(line.lstrip("#%/").strip() if comment else line, delimiter)
+        fits = width - 1 <= len(cells) <= width
+        if (
+            fits
+            and not comment
+            and any(_is_number(cell, decimal) for cell in cells)
+            and not _are_units(cells, decimal)
+        ):
+            first = k
+            break
+        if fits:
+            above.append(cells)
+    if first == len(lines):
+        raise RecordingError(f"{path}: holds a header but no rows of numbers.")
+    units = above.pop() if len(above) > 1 and _are_units(above[-1], decimal) else []
+    header = above[-1] if above else [f"column {k + 1}" for k in range(width)]
+    return _Layout(delimiter, decimal, width, header, [_bare(unit) for unit in units], first)
+
+
+def _bare(unit: str) -> str:
+    match = re.fullmatch(r"\[(.*)\]|\((.*)\)", unit)
+    return (match[1] or match[2] or "1") if match else unit
+
+
+def _are_units(cells: Sequence[str], decimal: str) -> bool:
+    """Return whether a row is one of units: all of them units or blank, and not all of them numbers."""
+    texts = [cell for cell in cells if cell not in ("", "-", "1")]
+    return bool(texts) and all(not _is_number(t, decimal) and is_unit(_bare(t)) for t in texts)
+
+
+def _labview_layout(path: Path, lines: Sequence[str]) -> _Layout:
+    """Read the two header blocks of a LabVIEW measurement file (NI, "LVM file specification")."""
+    ends = [k for k, line in enumerate(lines) if line.startswith("***End_of_Header***")]
+    if len(ends) > 2:
+        raise RecordingError(f"{path}: holds {len(ends) - 1} LabVIEW segments; export one segment per file.")
+    meta: dict[str, list[str]] = {}
+    for line in lines[: ends[-1]]:
+        cells = re.split(r"[\t,]", line)
+        meta.setdefault(cells[0].strip(), [cell.strip() for cell in cells[1:]])
+    delimiter = "," if (meta.get("Separator") or ["Tab"])[0].lower().startswith("comma") else "\t"
+    decimal = (
+        ","
+        if (meta.get("Decimal_Separator") or ["."])[0] == ""
+        else (meta.get("Decimal_Separator") or ["."])[0]
+    )
+    start = ends[-1] + 1
+    if start + 1 >= len(lines):
+        raise RecordingError(f"{path}: holds a LabVIEW header but no data.")
+    header = _split(lines[start], delimiter)
+    columns = (meta.get("X_Columns") or ["One"])[0]
+    if columns == "Multi":
+        raise RecordingError(f"{path}: has one X column per channel; export it with a single X column.")
+    stated = meta.get("Y_Unit_Label", [])
+    channels = [name for name in header if name not in ("X_Value", "Comment")]
+    by_name = dict(zip(channels, stated, strict=False)) | {"X_Value": "s"}
+    implicit = None
+    if columns == "No":
+        x0, dx = (_first_number(path, meta, key, decimal) for key in ("X0", "Delta_X"))
+        implicit = (x0, dx)
+    units = [by_name.get(name, "") for name in header]
+    return _Layout(delimiter, decimal, len(header), header, units, start + 1, implicit)
+
+
+def _first_number(path: Path, meta: dict[str, list[str]], key: str, decimal: str) -> float:
+    try:
+        return float((meta.get(key) or [""])[0].replace(decimal, "."))
+    except ValueError:
+        raise RecordingError(
+            f"{path}: has no time column and no number after {key!r} in its header."
+        ) from None
+
+
+def _parse(path: Path, rows: Sequence[tuple[int, str]], layout: _Layout) -> pd.DataFrame:
+    text = "\n".join(line for _, line in rows)
+    width = max(layout.width, len(layout.header))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            return pd.read_csv(
+                io.StringIO(text),
+                sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
+                decimal=layout.decimal,
+                header=None,
+                names=list(range(width)),
+                index_col=False,
+                na_values=_NAN_WORDS,
+                skipinitialspace=True,
+                float_precision="round_trip",
+                low_memory=False,
+                on_bad_lines="error",
+            )
+    except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
+        match = re.search(r"line (\d+)", str(error))
+        where = f"line {rows[int(match[1]) - 1][0]}" if match and int(match[1]) <= len(rows) else "a row"
+        raise RecordingError(
+            f"{path}: {where} has more cells than the header names; repair the file."
+        ) from None
+
+
+def _column(values: "pd.Series[float]", numbers: Sequence[int]) -> RawColumn:
+    if values.dtype.kind in "biuf":
+        return numeric(values.to_numpy())
+    texts = values.astype(str).str.strip()
+    if values.size and _STAMP.fullmatch(texts.iloc[0]):
+        try:
+            clock = ":" in texts.iloc[0][:3]
+            stamps = pd.to_timedelta(texts) if clock else pd.to_datetime(texts, format="ISO8601")
+            return numeric(stamps.to_numpy())
+        except (ValueError, TypeError):
+            pass
+    bad = np.flatnonzero(pd.to_numeric(texts, errors="coerce").isna() & values.notna())
+    if bad.size == 0:
+        return numeric(pd.to_numeric(texts, errors="coerce").to_numpy(dtype=np.float64))
+    k = int(bad[0])
+    return RawColumn(problem=f"is not numeric: {texts.iloc[k][:30]!r} on line {numbers[k]}")

@@ -1,0 +1,54 @@
+"""How noisy a channel is, from the recording alone.
+
+A second difference ``d = x[k-1] - 2 x[k] + x[k+1]`` removes offset and slope and turns white noise of
+standard deviation s into one of ``sqrt(6) s`` (1 + 4 + 1). Clipping at four standard deviations, repeated,
+removes the kinks and steps of the signal itself. Noise that is coloured, or a signal that bends all the
+time, biases the estimate: give the noise in the scenario then.
+
+A quantised signal with step q cannot be known better than ``q / sqrt(12)`` (uniform rounding error), however
+quiet it looks: that is the floor.
+"""
+
+import numpy as np
+
+from thsa_cosim.signals import FloatArray
+
+_CLIP = 4.0
+_CLIPPED_SHARE = 0.99906  # standard deviation of a unit normal truncated at 4
+
+
+def quantum(values: FloatArray) -> float:
+    """Return the quantisation step of (n,) ``values``, in their unit, or 0 if they lie on no lattice."""
+    levels = np.unique(values)
+    if levels.size < 3 or 2 * levels.size > values.size:
+        return 0.0
+    gaps = np.diff(levels)
+    largest = max(abs(float(levels[0])), abs(float(levels[-1])))
+    gaps = gaps[gaps > 64 * np.finfo(np.float32).eps * largest]  # levels split by float32 rounding
+    if gaps.size == 0:
+        return 0.0
+    step = float(np.median(gaps[gaps <= 1.5 * gaps.min()]))
+    multiples = gaps / step
+    off_lattice = np.abs(multiples - np.round(multiples)) > 0.05
+    return step if np.mean(off_lattice) <= 0.01 else 0.0
+
+
+def noise_estimate(values: FloatArray) -> float:
+    """Return the standard deviation of the white noise on (n,) equally spaced ``values``, in their unit.
+
+    0 means that no noise can be seen: fewer than 16 samples, or a signal that never changes.
+    """
+    if values.size < 16:
+        return 0.0
+    difference = np.diff(values, 2) / np.sqrt(6.0)
+    spread = float(np.median(np.abs(difference))) / 0.67449
+    if spread == 0.0:
+        # More than half of the differences vanish: steps on a lattice, with no noise to dither them.
+        return float(quantum(values) / np.sqrt(12.0))
+    for _ in range(20):
+        inner = difference[np.abs(difference) <= _CLIP * spread]
+        refined = float(np.sqrt(np.mean(inner**2))) / _CLIPPED_SHARE
+        if abs(refined - spread) <= 1e-6 * spread or refined == 0.0:
+            break
+        spread = refined
+    return float(max(spread, quantum(values) / np.sqrt(12.0)))

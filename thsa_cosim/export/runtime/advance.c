@@ -1,0 +1,244 @@
+/* advance.c - the Co-Simulation stepping loop: error control, state events, inputs, failure.
+ *
+ * Step size: PI control (Gustafsson; Hairer and Wanner, Solving ODE II, IV.2) with the size remembered across
+ * communication points; a step shortened by a communication point or an event never shrinks the remembered one.
+ * Events: within a step the modes m are frozen. Relation k disagrees with its mode when g[k] has left the dead
+ * band on the wrong side. If one disagrees at the end, in the middle, or at the vertex of the parabola through
+ * start, middle and end, the earliest bracketed disagreement is located on the dense output, the step is redone
+ * to land just past it, and the event iteration updates m there (FMI 2.0, 3.1.1; FMI 3.0, 3.1).
+ * The dead band (1e-13 of the largest |g| seen) keeps rounding noise at g = 0 from being an event, and a burst
+ * of events without progress is crossed by a blind step: the functions are continuous across relations.
+ */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "solver.h"
+
+#if N_X > 0
+
+enum { MOST_STEPS = 2000000, MOST_RAPID = 60 };
+
+typedef struct {
+    double disagreement[N_G + 1]; /* s*g - dead band, s = +1 where m = 0 and -1 where m = 1; > 0 = disagrees */
+    double worst;
+} Check;
+
+static Status give_up(Instance *c, const char *why) {
+    instance_log(c, DISCARD, LOG_DISCARD, "%s at time %.15g", why, c->s.now.time);
+    return DISCARD;
+}
+
+static double time_grain(const Instance *c, double end) {
+    return 16.0 * DBL_EPSILON * fmax(fabs(c->s.now.time), fabs(end));
+}
+
+static int judge(const Instance *c, const double *g, Check *out) {
+    double finite = 0.0;
+    out->worst = -DBL_MAX;
+    for (int k = 0; k < N_G; k++) {
+        const double away = (c->s.now.m[k] > 0.5 ? -g[k] : g[k]) - instance_dead_band(c, k);
+        out->disagreement[k] = away;
+        if (away > out->worst) out->worst = away;
+        finite += g[k] - g[k];
+    }
+    return finite != 0.0;
+}
+
+/* Relations at (time + dt, x) with the present modes; nonzero = not computable. */
+static int check_at(const Instance *c, double dt, const double *x, double *g, Check *out) {
+    const State *s = &c->s;
+    double moved[N_U + 1];
+    const double *u = s->now.u;
+    if (s->inputs_moving) {
+        solver_inputs(c, dt, moved);
+        u = moved;
+    }
+    return model_indicators(s->now.time + dt, x, u, s->p, s->d, s->now.m, g) || judge(c, g, out);
+}
+
+/* theta of a vertex in (0, 1) where the parabola through three agreeing points disagrees; 0 = none. */
+static double suspected_dip(const Check *start, const Check *middle, const Check *end) {
+    double found = 0.0, highest = 0.0;
+    for (int k = 0; k < N_G; k++) {
+        const double q0 = start->disagreement[k], qm = middle->disagreement[k], q1 = end->disagreement[k];
+        const double bend = 2.0 * (q0 - 2.0 * qm + q1), slope = 4.0 * qm - 3.0 * q0 - q1;
+        if (!(bend < 0.0)) continue;
+        const double theta = -0.5 * slope / bend;
+        if (!(theta > 0.0 && theta < 1.0)) continue;
+        const double top = q0 + 0.5 * slope * theta;
+        if (top > highest) {
+            highest = top;
+            found = theta;
+        }
+    }
+    return found;
+}
+
+/* Illinois method on the largest disagreement; returns theta just past the located change. */
+static double locate(Instance *c, double h, double a, double fa, double b, double fb, double grain) {
+    const double margin = 0.25 * grain / h;
+    double x[N_X], g[N_G + 1];
+    Check at;
+    int side = 0;
+    solver_dense_prepare(c);
+    for (int i = 0; i < 80 && (b - a) * h > grain; i++) {
+        double theta = (a * fb - b * fa) / (fb - fa);
+        if (i % 6 == 5 || !(theta > a && theta < b)) theta = 0.5 * (a + b);
+        if (theta < a + margin) theta = a + margin;
+        if (theta > b - margin) theta = b - margin;
+        solver_dense(c, theta, x);
+        if (check_at(c, theta * h, x, g, &at)) {
+            b = theta; /* not computable there: the change must come before */
+        } else if (at.worst > 0.0) {
+            b = theta, fb = at.worst;
+            if (side == 1) fa *= 0.5;
+            side = 1;
+        } else {
+            a = theta, fa = fmin(at.worst, -DBL_MIN);
+            if (side == -1) fb *= 0.5;
+            side = -1;
+        }
+    }
+    return b;
+}
+
+/* Where the step of size h just computed meets an event: theta in (0, 1]; 0 = nowhere, -1 = not computable. */
+static double find_event(Instance *c, double h, const Check *start, Check *end, double *g_end, double grain) {
+    double x[N_X], g[N_G + 1];
+    Check middle, dip;
+    const double f0 = fmin(start->worst, -DBL_MIN);
+    if (check_at(c, h, c->x_new, g_end, end)) return -1.0;
+    solver_dense_middle(c, x);
+    if (check_at(c, 0.5 * h, x, g, &middle)) return -1.0;
+    if (middle.worst > 0.0) return locate(c, h, 0.0, f0, 0.5, middle.worst, grain);
+    if (end->worst > 0.0) return locate(c, h, 0.5, fmin(middle.worst, -DBL_MIN), 1.0, end->worst, grain);
+    const double theta = suspected_dip(start, &middle, end);
+    if (theta <= 0.0) return 0.0;
+    solver_dense_prepare(c);
+    solver_dense(c, theta, x);
+    if (check_at(c, theta * h, x, g, &dip)) return -1.0;
+    return dip.worst > 0.0 ? locate(c, h, 0.0, f0, theta, dip.worst, grain) : 0.0;
+}
+
+/* A first step over which an Euler step would move 100 tolerances: the controller finds its way from there. */
+static double first_step(const Instance *c, double most) {
+    double rate = 0.0;
+    for (int n = 0; n < N_X; n++) {
+        const double scale = solver_tolerance(c) * (model_x_nominal[n] + fabs(c->s.now.x[n]));
+        rate = fmax(rate, fabs(c->dx[n]) / scale);
+    }
+    return rate * most > 100.0 ? 100.0 / rate : most;
+}
+
+/* The remembered step after one of size h was accepted with the scaled error given. */
+static void control(Motion *now, double h, double error, int was_rejected) {
+    const int shortened = h < 0.999 * now->step;
+    if (shortened && error < 0.3 && 8.0 * h <= now->step) return;
+    const double e = fmax(error, 1e-6);
+    double factor = 0.9 * pow(e, -0.7 / 5.0) * pow(fmax(now->last_error, 1e-4), 0.4 / 5.0);
+    factor = fmin(was_rejected ? 1.0 : 8.0, fmax(0.2, factor));
+    if (shortened && error < 0.3)
+        now->step = fmax(now->step, h * factor);
+    else
+        now->step = h * factor;
+    now->last_error = e;
+}
+
+static void commit(Instance *c, double time, const double *g_end, double from, const double *u_from) {
+    Motion *now = &c->s.now;
+    now->time = time;
+    memcpy(now->x, c->x_new, sizeof(double) * N_X);
+    if (c->s.inputs_moving)
+        for (int k = 0; k < N_U; k++) now->u[k] = u_from[k] + (time - from) * c->s.du[k];
+    if (g_end)
+        for (int k = 0; k < N_G; k++) now->span[k] = fmax(now->span[k], fabs(g_end[k]));
+    instance_changed(c);
+}
+
+Status solver_advance(Instance *c, double end) {
+    Motion *now = &c->s.now;
+    double from = now->time, u_from[N_U + 1], g[N_G + 1], last_event = -DBL_MAX, blind = 0.0;
+    long attempts = 0;
+    int rapid = 0;
+    Check start = {{0.0}, -DBL_MAX}, finish = start;
+    memcpy(u_from, now->u, sizeof u_from);
+    if (N_G && (instance_indicators(c) != OK || judge(c, c->g, &start)))
+        return give_up(c, "event indicators cannot be computed");
+
+    while (now->time < end) {
+        const double remaining = end - now->time, grain = time_grain(c, end);
+        int landing = 0, was_rejected = 0, last;
+        double h, error;
+        if (solver_linearize(c)) return give_up(c, "derivatives or Jacobian cannot be computed");
+        if (!(now->step > 0.0)) now->step = first_step(c, remaining);
+        h = 1.1 * now->step >= remaining ? remaining : now->step > 0.5 * remaining ? 0.5 * remaining : now->step;
+        if (rapid > MOST_RAPID) {
+            blind = blind > 0.0 ? 8.0 * blind : 64.0 * grain;
+            h = fmin(h, blind);
+        }
+        for (;;) { /* attempts at one step */
+            if (++attempts > MOST_STEPS) return give_up(c, "too many internal steps in one communication step");
+            if (c->before_step && !landing) {
+                c->before_step(c, now->time + h);
+                from = now->time;
+                memcpy(u_from, now->u, sizeof u_from);
+                if (solver_linearize(c)) return give_up(c, "derivatives or Jacobian cannot be computed");
+            }
+            error = solver_step(c, h);
+            if (error >= 0.0 && error <= 1.0) {
+                if (!N_G || landing) break;
+                if (rapid > MOST_RAPID) break;
+                const double theta = find_event(c, h, &start, &finish, g, grain);
+                if (theta == 0.0) break;
+                if (theta >= 1.0) {
+                    landing = 1;
+                    break;
+                }
+                if (theta > 0.0) {
+                    landing = 1;
+                    h = fmax(theta * h, grain);
+                    continue;
+                }
+                error = -1.0;
+            }
+            c->rejected++;
+            was_rejected = 1;
+            landing = 0;
+            h *= error < 0.0 ? 0.1 : fmax(0.1, 0.9 * pow(error, -0.2));
+            now->step = h;
+            if (h < grain)
+                return give_up(c, error < 0.0 ? "the model cannot be evaluated" : "the step size became too small");
+        }
+        c->steps++;
+        last = h >= remaining;
+        if (!landing && rapid <= MOST_RAPID) control(now, h, error, was_rejected);
+        commit(c, last ? end : now->time + h, N_G && !landing && rapid <= MOST_RAPID ? g : NULL, from, u_from);
+        if (c->after_step) c->after_step(c);
+        if (!N_G) continue;
+        if (!landing && rapid <= MOST_RAPID) {
+            start = finish;
+            continue;
+        }
+        if (now->time - last_event > 1e-6 * now->step) rapid = 0, blind = 0.0;
+        last_event = now->time;
+        if (++rapid == MOST_RAPID)
+            instance_log(c, WARNING, LOG_WARNING, "burst of events at time %.15g is crossed blindly", now->time);
+        if (instance_update_modes(c) != OK) return DISCARD;
+        if (instance_indicators(c) != OK || judge(c, c->g, &start))
+            return give_up(c, "event indicators cannot be computed");
+    }
+    return OK;
+}
+
+#else
+
+Status solver_advance(Instance *c, double end) {
+    State *s = &c->s;
+    if (c->before_step) c->before_step(c, end);
+    for (int k = 0; k < N_U; k++) s->now.u[k] += (end - s->now.time) * s->du[k];
+    s->now.time = end;
+    instance_changed(c);
+    return instance_update_modes(c);
+}
+
+#endif

@@ -1,0 +1,123 @@
+/* instance.h - an FMI-independent instance of the model: its state, its caches and its services.
+ *
+ * Everything a run depends on lives in the plain struct State (no pointers), so that saving, restoring and
+ * serialising an FMU state is a copy. No global variables: instances are independent of each other.
+ * Status values and phases are numbered so that fmi2.c and fmi3.c only cast them.
+ */
+#ifndef THSA_INSTANCE_H
+#define THSA_INSTANCE_H
+
+#include <stddef.h>
+#include "model.h"
+
+typedef enum { OK = 0, WARNING = 1, DISCARD = 2, FAILED = 3, FATAL = 4 } Status; /* = fmi2Status, fmi3Status */
+
+typedef enum {
+    INSTANTIATED = 1, INITIALIZATION = 2, EVENT_MODE = 4, CONTINUOUS = 8, STEP_MODE = 16,
+    STEP_FAILED = 32, TERMINATED = 64, IN_ERROR = 128, INTERMEDIATE = 256, IN_STEP = 512
+} Phase;
+
+typedef enum { CO_SIMULATION = 1, MODEL_EXCHANGE = 2 } Kind;
+
+typedef enum {
+    LOG_WARNING = 1, LOG_DISCARD = 2, LOG_ERROR = 4, LOG_FATAL = 8, LOG_EVENTS = 16, LOG_SOLVER = 32, LOG_ALL = 63
+} Category;
+
+enum { RODAS_STAGES = 8 };
+
+/* What integration changes: copied at the start of each communication step, restored when it fails. */
+typedef struct {
+    double time;
+    double step;             /* step size the controller remembers; 0 = none yet */
+    double last_error;       /* scaled error of the last accepted step (PI control) */
+    double x[N_X + 1], u[N_U + 1], m[N_G + 1];
+    double span[N_G + 1];    /* largest |g| seen: scale of the dead band that rounding noise cannot leave */
+} Motion;
+
+typedef struct {
+    double p[N_P + 1], d[N_D + 1], x_start[N_X + 1];
+    double du[N_U + 1];      /* input derivatives of the next communication step */
+    Motion now;
+    double start_time, stop_time, tolerance;
+    double last_step_end;    /* time reached by the last successful communication step */
+    int phase;
+    int tolerance_defined, stop_defined;
+    int inputs_moving;       /* some du != 0 */
+    int derivatives_used;    /* du belong to the step just done; the next one starts with du = 0 */
+    int dependent_due;       /* p changed: d is out of date */
+    int initial_due;         /* initial equations not solved for the present start values */
+    int modes_due;           /* inputs or parameters jumped: relations have to be checked (Co-Simulation) */
+    int event_mode_used;     /* FMI 3 Co-Simulation with Event Mode */
+} State;
+
+typedef struct Instance Instance;
+
+struct Instance {
+    State s;
+    Kind kind;
+    unsigned categories;     /* enabled log categories */
+    void *layer;             /* owned by fmi2.c or fmi3.c */
+    void (*emit)(Instance *, Status, const char *category, const char *message);
+    void (*before_step)(Instance *, double time);  /* FMI 3 intermediate update: inputs wanted at `time` */
+    void (*after_step)(Instance *);                /* FMI 3 intermediate update: an internal step is done */
+
+    /* caches: valid for the present (time, x, u, p, m) */
+    int dx_valid, y_valid, w_valid, g_valid;
+    double dx[N_X + 1], w[N_W + 1], g[N_G + 1];
+
+    /* solver workspace, nothing in it outlives a change of the point except through its validity flags */
+    int jacobian_valid, factors_of; /* factors_of: index of the Jacobian that lu holds, -1 = none */
+    int current;                    /* index of the present Jacobian in J */
+    int dense_ready;                /* stage holds the dense output's polynomials */
+    double factored_step;
+    double J[2][N_X * N_X + 1], B[N_X * N_U + 1], ft[N_X + 1];
+    double lu[N_X * N_X + 1];
+    int pivot[N_X + 1];
+    double stage[RODAS_STAGES][N_X + 1];
+    double x_new[N_X + 1];
+    long events, steps, rejected;
+};
+
+extern const char *const category_names[6]; /* in the order of the bits of Category */
+
+void instance_log(Instance *c, Status status, Category category, const char *format, ...)
+#if defined(__GNUC__) || defined(__clang__)
+    __attribute__((format(printf, 4, 5)))
+#endif
+    ;
+
+void instance_reset(Instance *c);       /* as freshly instantiated; logging stays */
+void instance_changed(Instance *c);     /* the point changed: caches are void */
+Status instance_setup(Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined, double stop);
+Status instance_initialize(Instance *c);         /* solve the initial equations if they are due */
+Status instance_update_modes(Instance *c);       /* event iteration at the present point */
+Status instance_settle(Instance *c);             /* bring d, x, m up to date as the phase demands */
+Status instance_derivatives(Instance *c);        /* fills c->dx */
+Status instance_indicators(Instance *c);         /* fills c->g */
+double instance_indicator(const Instance *c, int k); /* g[k] shifted by its dead band: never 0 */
+double instance_dead_band(const Instance *c, int k);
+
+Status instance_get(Instance *c, const unsigned *vr, size_t n, double *values);
+Status instance_set(Instance *c, const unsigned *vr, size_t n, const double *values);
+Status instance_set_states(Instance *c, const double *x, size_t n);
+Status instance_set_time(Instance *c, double time);
+Status instance_set_input_derivatives(Instance *c, const unsigned *vr, size_t n, const int *order, const double *values);
+Status instance_output_derivatives(Instance *c, const unsigned *vr, size_t n, const int *order, double *values);
+Status instance_directional(Instance *c, const unsigned *unknown, size_t n_unknown, const unsigned *known,
+                            size_t n_known, const double *seed, double *sensitivity);
+Status instance_adjoint(Instance *c, const unsigned *unknown, size_t n_unknown, const unsigned *known,
+                        size_t n_known, const double *seed, double *sensitivity);
+Status instance_do_step(Instance *c, double from, double size);
+
+/* saved states (snapshot.c) */
+typedef struct Snapshot Snapshot;
+Status snapshot_take(Instance *c, Snapshot **out);
+Status snapshot_restore(Instance *c, const Snapshot *in);
+void snapshot_free(Snapshot **in);
+size_t snapshot_size(void);
+void snapshot_write(const Snapshot *in, unsigned char *bytes);
+Status snapshot_read(Instance *c, const unsigned char *bytes, size_t size, Snapshot **out);
+
+static inline int is_finite(double v) { return v - v == 0.0; }
+
+#endif

@@ -1,0 +1,33 @@
+/* model.h - what a generated model.c provides to the runtime (see also model_config.h).
+ *
+ * Between events every relation k is frozen at its mode m[k] (0.0 or 1.0); relation k is true iff g[k] > 0.
+ * With m frozen the functions are smooth, so each branch is used beyond its border until the event is located.
+ * Every function returns 0, or nonzero when it cannot compute; the runtime also checks for non-finite results.
+ * Arrays are column-major; a pointer to an empty array may be passed where the length is 0.
+ */
+#ifndef THSA_MODEL_H
+#define THSA_MODEL_H
+
+#include "model_config.h"
+
+#if N_X < 0 || N_U < 0 || N_P < 0 || N_D < 0 || N_W < 0 || N_Y > N_W || N_G < 0
+#error "model_config.h: inconsistent sizes"
+#endif
+
+extern const double model_p_start[], model_u_start[], model_x_start[], model_x_nominal[];
+extern const unsigned char model_p_tunable[]; /* 1: may be set while simulating; 0: fixed */
+
+#define MODEL_POINT double t, const double *x, const double *u, const double *p, const double *d, const double *m
+
+int model_dependent(const double *p, double *d);  /* calculated parameters */
+int model_initial(double t, const double *u, const double *p, const double *d, const double *m,
+                  const double *x_start, double *x);  /* initial equations for given modes */
+int model_rhs(MODEL_POINT, double *dx);
+int model_algebraic(MODEL_POINT, double *w);   /* all N_W */
+int model_outputs(MODEL_POINT, double *y);     /* the first N_Y of w */
+int model_indicators(MODEL_POINT, double *g);  /* N_G */
+int model_jacobian(MODEL_POINT, double *A, double *B, double *ft);  /* df/dx, df/du, partial df/dt */
+int model_directional(MODEL_POINT, const double *sx, const double *su, const double *sp,
+                      double *ddx, double *dw);  /* exact directional derivatives of dx and w */
+
+#endif

@@ -1,0 +1,209 @@
+/* solver.c - Rodas5P: one stiffly accurate, L-stable Rosenbrock-Wanner step for x' = f(t, x, u(t)).
+ *
+ * Method and coefficients: G. Steinebach, "Construction of Rosenbrock-Wanner method Rodas5P and numerical
+ * benchmarks within the Julia Differential Equations package", BIT Numer. Math. 63 (2023) 27; order 5(4), dense
+ * output of order 4. Notation of Hairer and Wanner, Solving ODE II, IV.7, eq. (7.25): with W = I/(gamma h) - J
+ *     W U_i = f(t + c_i h, x + sum a_ij U_j) + sum (C_ij/h) U_j + d_i h f_t,   f_t = df/dt + df/du u'.
+ * Stages 6 to 8 share their row of a (each adds the previous U), so x_new = last argument + U_8 and the embedded
+ * error is U_8 itself. Inputs are piecewise linear in time, hence exact at every stage.
+ */
+#include <math.h>
+#include <string.h>
+#include "solver.h"
+
+#if N_X > 0
+
+enum { STAGES = RODAS_STAGES, FULL_ROWS = 6 }; /* rows of a that are not "previous row plus last stage" */
+
+static const double gamma_ = 0.21193756319429014;
+static const double a[FULL_ROWS][5] = {
+    {0},
+    {3.0},
+    {2.849394379747939, 0.45842242204463923},
+    {-6.954028509809101, 2.489845061869568, -10.358996098473584},
+    {2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641},
+    {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946},
+};
+static const double C[STAGES][STAGES - 1] = {
+    {0},
+    {-14.155112264123755},
+    {-17.97296035885952, -2.859693295451294},
+    {147.12150275711716, -1.41221402718213, 71.68940251302358},
+    {165.43517024871676, -0.4592823456491126, 42.90938336958603, -5.961986721573306},
+    {24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471},
+    {30.91273214028599, -3.1208243349937974, 77.79954646070892, 34.28646028294783, -19.097331116725623,
+     -28.087943162872662},
+    {37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047, -40.06618937091002,
+     -54.66780262877968, -9.48861652309627},
+};
+static const double c_[STAGES] = {0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716,
+                                  0.4288403609558664, 1, 1, 1};
+static const double d_[STAGES] = {0.21193756319429014, -0.42387512638858027, -0.3384627126235924,
+                                  1.8046452872882734, 2.325825639765069, 0, 0, 0};
+/* x(theta) = (1-theta) x0 + theta (x1 + (1-theta) (k1 + theta (k2 + theta k3))), k_r = sum H_rj U_j */
+static const double H[3][STAGES] = {
+    {25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204, 0.524948541321073,
+     1.1241088310450404, 0.4272876194431874, -0.17202221070155493},
+    {-9.91568850695171, -0.9689944594115154, 3.0438037242978453, -24.495224566215796, 20.176138334709044,
+     15.98066361424651, -6.789040303419874, -6.710236069923372},
+    {11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643, -52.072871366152654,
+     -59.78993625266729, -0.15582684282751913, 4.883087185713722},
+};
+
+double solver_tolerance(const Instance *c) { return 0.1 * c->s.tolerance; }
+
+void solver_inputs(const Instance *c, double h, double *u) {
+    for (int k = 0; k < N_U; k++) u[k] = c->s.now.u[k] + h * c->s.du[k];
+}
+
+/* LU with partial pivoting, column-major, reciprocals on the diagonal; structural zeros are skipped. */
+static int factorize(double *restrict w, int *restrict pivot) {
+    for (int k = 0; k < N_X; k++) {
+        double *col = w + k * N_X;
+        int best = k;
+        for (int i = k + 1; i < N_X; i++)
+            if (fabs(col[i]) > fabs(col[best])) best = i;
+        if (!(fabs(col[best]) > 0.0) || !is_finite(col[best])) return 1;
+        pivot[k] = best;
+        if (best != k)
+            for (int j = 0; j < N_X; j++) {
+                double swap = w[j * N_X + k];
+                w[j * N_X + k] = w[j * N_X + best];
+                w[j * N_X + best] = swap;
+            }
+        const double inverse = 1.0 / col[k];
+        col[k] = inverse;
+        for (int i = k + 1; i < N_X; i++) col[i] *= inverse;
+        for (int j = k + 1; j < N_X; j++) {
+            double *restrict right = w + j * N_X;
+            const double factor = right[k];
+            if (factor == 0.0) continue;
+            for (int i = k + 1; i < N_X; i++) right[i] -= factor * col[i];
+        }
+    }
+    return 0;
+}
+
+static void solve(const double *restrict w, const int *restrict pivot, double *restrict b) {
+    for (int k = 0; k < N_X; k++) {
+        const double swap = b[k];
+        b[k] = b[pivot[k]];
+        b[pivot[k]] = swap;
+    }
+    for (int k = 0; k < N_X; k++) {
+        const double v = b[k];
+        for (int i = k + 1; i < N_X; i++) b[i] -= v * w[k * N_X + i];
+    }
+    for (int k = N_X - 1; k >= 0; k--) {
+        const double v = b[k] *= w[k * N_X + k];
+        for (int i = 0; i < k; i++) b[i] -= v * w[k * N_X + i];
+    }
+}
+
+int solver_linearize(Instance *c) {
+    State *s = &c->s;
+    if (!c->dx_valid && instance_derivatives(c) != OK) return 1;
+    if (c->jacobian_valid) return 0;
+    const int fresh = 1 - c->current;
+    if (model_jacobian(s->now.time, s->now.x, s->now.u, s->p, s->d, s->now.m, c->J[fresh], c->B, c->ft)) return 1;
+    if (memcmp(c->J[fresh], c->J[c->current], sizeof(double) * N_X * N_X) != 0) {
+        if (c->factors_of == fresh) c->factors_of = -1;
+        c->current = fresh;
+    }
+    if (s->inputs_moving)
+        for (int k = 0; k < N_U; k++) {
+            const double slope = s->du[k];
+            if (slope == 0.0) continue;
+            for (int i = 0; i < N_X; i++) c->ft[i] += slope * c->B[k * N_X + i];
+        }
+    c->jacobian_valid = 1;
+    return 0;
+}
+
+double solver_step(Instance *c, double h) {
+    const State *s = &c->s;
+    const double *restrict x0 = s->now.x;
+    double argument[N_X], moved[N_U + 1];
+    const double per_h = 1.0 / h;
+
+    c->dense_ready = 0;
+    if (c->factors_of != c->current || c->factored_step != h) {
+        const double shift = per_h / gamma_;
+        const double *J = c->J[c->current];
+        for (int i = 0; i < N_X * N_X; i++) c->lu[i] = -J[i];
+        for (int i = 0; i < N_X; i++) c->lu[i * (N_X + 1)] += shift;
+        c->factors_of = -1;
+        if (factorize(c->lu, c->pivot)) return -1.0;
+        c->factors_of = c->current;
+        c->factored_step = h;
+    }
+
+    for (int i = 0; i < STAGES; i++) {
+        double *restrict U = c->stage[i];
+        if (i == 0) {
+            for (int n = 0; n < N_X; n++) U[n] = c->dx[n];
+        } else {
+            if (i < FULL_ROWS) {
+                for (int n = 0; n < N_X; n++) argument[n] = x0[n];
+                for (int j = 0; j < i; j++)
+                    for (int n = 0; n < N_X; n++) argument[n] += a[i][j] * c->stage[j][n];
+            } else {
+                for (int n = 0; n < N_X; n++) argument[n] += c->stage[i - 1][n];
+            }
+            const double *u = s->now.u;
+            if (s->inputs_moving) {
+                solver_inputs(c, c_[i] * h, moved);
+                u = moved;
+            }
+            if (model_rhs(s->now.time + c_[i] * h, argument, u, s->p, s->d, s->now.m, U)) return -1.0;
+            for (int j = 0; j < i; j++) {
+                const double factor = C[i][j] * per_h;
+                for (int n = 0; n < N_X; n++) U[n] += factor * c->stage[j][n];
+            }
+        }
+        if (d_[i] != 0.0)
+            for (int n = 0; n < N_X; n++) U[n] += d_[i] * h * c->ft[n];
+        solve(c->lu, c->pivot, U);
+    }
+
+    const double tolerance = solver_tolerance(c);
+    const double *error = c->stage[STAGES - 1];
+    double worst = 0.0, finite = 0.0;
+    for (int n = 0; n < N_X; n++) {
+        c->x_new[n] = argument[n] + error[n];
+        const double size = fmax(fabs(x0[n]), fabs(c->x_new[n]));
+        const double scaled = fabs(error[n]) / (tolerance * (model_x_nominal[n] + size));
+        worst = scaled > worst ? scaled : worst;
+        finite += c->x_new[n] - c->x_new[n];
+    }
+    return finite == 0.0 ? worst : -1.0;
+}
+
+void solver_dense_middle(const Instance *c, double *x) {
+    for (int n = 0; n < N_X; n++) x[n] = 0.5 * (c->s.now.x[n] + c->x_new[n]);
+    for (int j = 0; j < STAGES; j++) {
+        const double weight = 0.25 * (H[0][j] + 0.5 * (H[1][j] + 0.5 * H[2][j]));
+        for (int n = 0; n < N_X; n++) x[n] += weight * c->stage[j][n];
+    }
+}
+
+void solver_dense_prepare(Instance *c) {
+    if (c->dense_ready) return;
+    c->dense_ready = 1;
+    for (int n = 0; n < N_X; n++) {
+        double k[3] = {0.0, 0.0, 0.0};
+        for (int j = 0; j < STAGES; j++)
+            for (int r = 0; r < 3; r++) k[r] += H[r][j] * c->stage[j][n];
+        for (int r = 0; r < 3; r++) c->stage[r][n] = k[r]; /* the stages are not needed any more */
+    }
+}
+
+void solver_dense(const Instance *c, double theta, double *x) {
+    const double rest = 1.0 - theta;
+    for (int n = 0; n < N_X; n++) {
+        const double bend = c->stage[0][n] + theta * (c->stage[1][n] + theta * c->stage[2][n]);
+        x[n] = rest * c->s.now.x[n] + theta * (c->x_new[n] + rest * bend);
+    }
+}
+
+#endif

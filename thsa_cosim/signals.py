@@ -27,6 +27,8 @@ class Signals:
         One (n,) array per name; NaN is allowed (a failed run is judged elsewhere).
     units
         Unit string per name; a name that is left out has the unit ``"1"``.
+    held
+        Names whose value holds from one sample to the next; the others run linearly between samples.
 
     Everything is kept as contiguous float64, so that compiled loops take the arrays as they are.
 
@@ -39,6 +41,7 @@ class Signals:
     time: FloatArray
     values: Mapping[str, FloatArray]
     units: Mapping[str, str] = field(default_factory=dict)
+    held: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         time = np.ascontiguousarray(self.time, dtype=np.float64)
@@ -52,11 +55,12 @@ class Signals:
         for name, column in values.items():
             if column.shape != time.shape:
                 raise ValueError(f"signal {name!r} has shape {column.shape}, but time has {time.shape}.")
-        for name in self.units:
+        for name in (*self.units, *self.held):
             if name not in values:
-                raise ValueError(f"unit for unknown signal {name!r}.{did_you_mean(name, values)}")
+                raise ValueError(f"unit or hold for unknown signal {name!r}.{did_you_mean(name, values)}")
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "values", values)
+        object.__setattr__(self, "held", frozenset(self.held))
         object.__setattr__(self, "units", {name: self.units.get(name, "1") for name in values})
 
     @property
@@ -79,7 +83,12 @@ class Signals:
     def select(self, names: Iterable[str]) -> "Signals":
         """Return the named signals, in that order."""
         chosen = tuple(names)
-        return Signals(self.time, {n: self[n] for n in chosen}, {n: self.units[n] for n in chosen})
+        return Signals(
+            self.time,
+            {n: self[n] for n in chosen},
+            {n: self.units[n] for n in chosen},
+            self.held & set(chosen),
+        )
 
     def window(self, start: float | None = None, stop: float | None = None) -> "Signals":
         """Return the samples with ``start <= time <= stop`` [s]; time keeps its values."""
@@ -88,22 +97,31 @@ class Signals:
             inside &= self.time >= start
         if stop is not None:
             inside &= self.time <= stop
-        return Signals(self.time[inside], {n: v[inside] for n, v in self.values.items()}, self.units)
+        return Signals(
+            self.time[inside], {n: v[inside] for n, v in self.values.items()}, self.units, self.held
+        )
 
     def resample(self, time: ArrayLike) -> "Signals":
-        """Return linear interpolations at ``time`` ((m,) s); outside its span a signal holds."""
+        """Return the values at ``time`` ((m,) s): linear, or held for ``held``; outside the span they hold.
+
+        A time within 1e-6 of the shortest step before a sample counts as that sample.
+        """
         if len(self) == 0:
             raise ValueError("signals without samples cannot be resampled.")
         target = np.ascontiguousarray(time, dtype=np.float64)
-        columns = {n: np.interp(target, self.time, v) for n, v in self.values.items()}
-        return Signals(target, columns, self.units)
+        slack = 1e-6 * float(np.min(np.diff(self.time))) if len(self) > 1 else 0.0
+        last = np.maximum(np.searchsorted(self.time, target + slack, side="right") - 1, 0)
+        columns = {
+            n: v[last] if n in self.held else np.interp(target, self.time, v) for n, v in self.values.items()
+        }
+        return Signals(target, columns, self.units, self.held)
 
     def with_values(
         self, values: Mapping[str, FloatArray], units: Mapping[str, str] | None = None
     ) -> "Signals":
         """Return signals on the same time axis with ``values`` added or replaced."""
         merged_units = {**self.units, **{n: (units or {}).get(n, self.units.get(n, "1")) for n in values}}
-        return Signals(self.time, {**self.values, **values}, merged_units)
+        return Signals(self.time, {**self.values, **values}, merged_units, self.held)
 
     def to_frame(self) -> "pd.DataFrame":
         """Return a table with index ``time [s]`` and one column ``name [unit]`` per signal."""

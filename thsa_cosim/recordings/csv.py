@@ -79,7 +79,7 @@ def read(path: Path, choose: Choose) -> dict[str, RawColumn]:
         unit = layout.units[k] if k < len(layout.units) and layout.units[k] else split_unit(name)[1]
         time: FloatArray | None = None
         if layout.step is not None:
-            time = layout.step[0] + layout.step[1] * np.arange(len(rows))
+            time = layout.step[0] + layout.step[1] * np.arange(len(rows), dtype=np.float64)
         columns[name] = RawColumn(column.values, column.unit or unit, time, column.problem)
     return columns
 

@@ -43,6 +43,9 @@ class Column:
         s; the signal is moved to later times by this much (negative: a sensor lag is taken out).
     smooth
         ``"mean"`` replaces the signal by its mean.
+    interpolation
+        ``"linear"`` between samples, or ``"hold"``: the value stays until the next sample, as a digital
+        command does.
     """
 
     column: str | None = None
@@ -52,6 +55,7 @@ class Column:
     offset: float = 0.0
     shift: float = 0.0
     smooth: Literal["none", "mean"] = "none"
+    interpolation: Literal["linear", "hold"] = "linear"
 
 
 @dataclass(frozen=True)
@@ -161,12 +165,14 @@ def read_recording(
         elif source.shift == 0.0 and np.array_equal(t[kept], grid):
             values[signal] = numbers[kept]
         else:
-            values[signal] = np.interp(grid - source.shift, t, numbers)
+            held = frozenset((signal,)) if source.interpolation == "hold" else frozenset()
+            values[signal] = Signals(t, {signal: numbers}, held=held).resample(grid - source.shift)[signal]
     degrees = _temperature(values, temperature, targets)
     values.pop(_TEMPERATURE, None)
     noise.pop(_TEMPERATURE, None)
+    held = frozenset(n for n in values if columns[n].interpolation == "hold")
     stamped = grid - grid[0] if axis.from_zero else grid
-    signals = Signals(stamped, values, {n: targets.get(n) or columns[n].unit or "1" for n in values})
+    signals = Signals(stamped, values, {n: targets.get(n) or columns[n].unit or "1" for n in values}, held)
     return Recording(name or path.stem, path, sha256, signals, degrees, noise)
 
 

@@ -34,5 +34,5 @@ def _column(channel: Any) -> RawColumn:
     time: FloatArray | None = None
     if step:
         start = float(channel.properties.get("wf_start_offset") or 0.0)
-        time = start + float(step) * np.arange(column.values.size)
+        time = start + float(step) * np.arange(column.values.size, dtype=np.float64)
     return RawColumn(column.values, column.unit or unit or split_unit(channel.name)[1], time)

@@ -2,7 +2,7 @@ within THSA;
 model Motor "Permanent-magnet synchronous motor in the power-invariant dq frame, with rotor and friction"
   THSA.Interfaces.RealInput u_q(unit="V") "Voltage of the q axis";
   THSA.Interfaces.RealInput T(unit="degC") "Temperature of winding, magnets and bearings";
-  THSA.Interfaces.RealOutput i_q(unit="A", start=0, fixed=true, nominal=1) "Current of the q axis";
+  THSA.Interfaces.RealOutput i_q(unit="A", start=0, fixed=true, nominal=10) "Current of the q axis";
   THSA.Interfaces.RealOutput w_m(unit="rad/s", start=0, fixed=true, nominal=10) "Speed of the rotor";
   THSA.Interfaces.RotationalFlange flange "Shaft";
   parameter THSA.Units.Ratio p(min=1, max=100) = 4 "Number of pole pairs";

@@ -1,7 +1,7 @@
 within THSA.Controllers;
 block VelocityController "Velocity loop: PI law from motor speed error to current reference"
   extends THSA.Controllers.LimitedPI(
-    reference(unit="rad/s"), measurement(unit="rad/s"), y(unit="A"), e(unit="rad/s"), z(unit="rad", nominal=1), y_pi(unit="A"),
+    reference(unit="rad/s"), measurement(unit="rad/s"), y(unit="A"), e(unit="rad/s"), z(unit="rad", nominal=10), y_pi(unit="A"),
     k_p(unit="A.s/rad"), k_i(unit="A/rad"), y_max(unit="A"), band(unit="A"));
   parameter Real K_p(unit="A.s/rad", min=0, max=100) = 0.12 "Proportional gain";
   parameter Real K_i(unit="A/rad", min=0, max=1000) = 0.45 "Integral gain";

@@ -13,10 +13,32 @@ SOURCES = Path(__file__).parent
 FAULTS = {
     name: number
     for number, name in enumerate(
-        (
-            "none segfault abort exit hang init_hang error fatal discard nan inf short memory flood files "
-            "pending free_crash init_crash init_error child slow term_error leak chdir"
-        ).split()
+        [
+            "none",
+            "segfault",
+            "abort",
+            "exit",
+            "hang",
+            "init_hang",
+            "error",
+            "fatal",
+            "discard",
+            "nan",
+            "inf",
+            "short",
+            "memory",
+            "flood",
+            "files",
+            "pending",
+            "free_crash",
+            "init_crash",
+            "init_error",
+            "child",
+            "slow",
+            "term_error",
+            "leak",
+            "chdir",
+        ]
     )
 }
 """Values of the parameter ``fault`` of lag2.c."""

@@ -1,0 +1,15 @@
+"""Batches of simulations: jobs in, outcomes out, whatever an FMU does.
+
+``job``, ``outcome``  what is to be simulated, what became of it
+``runner``            what all runners promise
+``local``             worker processes on this machine (``process`` and ``worker``: its two ends)
+``cluster``           the same jobs on a Dask cluster
+``journal``           the durable table of evaluated vectors
+"""
+
+from thsa_cosim.batch.job import Experiment, Job, Reducer
+from thsa_cosim.batch.local import LocalRunner
+from thsa_cosim.batch.outcome import Outcome, Status
+from thsa_cosim.batch.runner import Runner
+
+__all__ = ["Experiment", "Job", "LocalRunner", "Outcome", "Reducer", "Runner", "Status"]

@@ -1,0 +1,83 @@
+"""Messages between a runner and its workers: length-prefixed pickles over pipes."""
+
+import pickle
+import struct
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+from thsa_cosim.batch.outcome import Outcome
+
+_LENGTH = struct.Struct("<Q")
+
+
+@dataclass(frozen=True)
+class Setup:
+    """First message to a worker."""
+
+    root: str
+    """The study's folder: experiments, unpacked FMUs."""
+    folder: str
+    """The worker's own folder: console, progress, cwd/."""
+    memory_limit: int | None
+    """Bytes that the worker may grow by."""
+    console_limit: int
+    """Bytes of native output kept per run."""
+    kind: str | None
+    backend: str | None
+    reuse: str
+    main: dict[str, Any] | None
+    """What ``multiprocessing`` needs to import the parent's __main__, where reducers live in it."""
+
+
+@dataclass(frozen=True)
+class Ready:
+    """First message from a worker: imports are done, machine code is loaded."""
+
+    rss: int
+    """Resident bytes of the idle worker."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """One job for a worker."""
+
+    serial: int
+    experiment: int
+    values: dict[str, float]
+    keep_signals: bool
+
+
+@dataclass(frozen=True)
+class Done:
+    """One finished job."""
+
+    serial: int
+    outcome: Outcome
+    rss: int
+    leaves: bool
+    """The worker ends itself now, as the FMU reported a fatal error."""
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Last message to a worker; a pipe that ends without it means that the parent has died."""
+
+
+def write_frame(pipe: BinaryIO, message: Any) -> None:
+    """Send one message."""
+    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    pipe.write(_LENGTH.pack(len(data)) + data)
+    pipe.flush()
+
+
+def read_frame(pipe: BinaryIO) -> Any | None:
+    """Receive one message; None when the pipe has ended (torn messages count as ended)."""
+    try:
+        head = pipe.read(_LENGTH.size)
+        if len(head) < _LENGTH.size:
+            return None
+        (length,) = _LENGTH.unpack(head)
+        data = pipe.read(length)
+    except (OSError, ValueError):
+        return None
+    return pickle.loads(data) if len(data) == length else None

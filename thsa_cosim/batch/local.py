@@ -1,0 +1,308 @@
+"""Runs batches on this machine: spawned worker processes that an FMU may crash, hang or bloat."""
+
+import itertools
+import queue
+import signal
+import time
+import weakref
+from collections import deque
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Self
+
+from thsa_cosim.batch.frames import Done, Order, Ready, Setup
+from thsa_cosim.batch.job import Experiment, Job
+from thsa_cosim.batch.outcome import Outcome, Status
+from thsa_cosim.batch.process import Events, Progress, WorkerProcess
+from thsa_cosim.batch.runner import OnOutcome, check_jobs
+from thsa_cosim.batch.study import Study
+from thsa_cosim.errors import ParameterError, StudyError
+from thsa_cosim.fmu.plant import Backend, Kind, Reuse
+
+_TICK_S = 0.05
+"""How often deadlines, memory and floods are looked at."""
+_START_LIMIT_S = 180.0
+"""A worker that is not ready by then is taken for dead (first start: machine code is compiled)."""
+_FAILED_STARTS = 3
+_CLOSE_S = 2.0
+
+
+class LocalRunner:
+    """Worker processes with one live FMU instance each; see ``Runner``.
+
+    A run that crashes, exits, hangs, outgrows its memory or floods its output costs its worker at most: the
+    job gets an Outcome that says so, jobs that were waiting in that worker go to others, and no job is
+    evaluated twice.
+    """
+
+    def __init__(
+        self,
+        experiments: Sequence[Experiment],
+        *,
+        workers: int = 1,
+        deadline_s: float | None = None,
+        memory_limit_mb: float | None = None,
+        reuse: Reuse = "fresh",
+        kind: Kind | None = None,
+        backend: Backend | None = None,
+        recycle_runs: int = 2000,
+        recycle_growth_mb: float = 512.0,
+        console_limit: int = 8192,
+    ) -> None:
+        """Unpack the FMUs, write down the experiments, start the workers.
+
+        Parameters
+        ----------
+        workers
+            Number of processes.
+        deadline_s
+            Wall time after which a run is killed, s; None: never.
+        memory_limit_mb
+            MiB that one worker may grow beyond its idle size; None: no limit.
+        reuse
+            "fresh": a new instance per run. "reset": only for FMUs whose reset is known to be right.
+        kind, backend
+            As for ``Plant.open``.
+        recycle_runs, recycle_growth_mb
+            A worker is replaced after so many runs, or when idle it has grown by so many MiB (leaks).
+        console_limit
+            Bytes of native output kept per run.
+
+        Raises
+        ------
+        ParameterError, FmuError
+            If an experiment names variables that its FMU does not have. An FMU that cannot be read is an
+            outcome (``Status.BAD_ARCHIVE``) of its jobs instead.
+        """
+        if workers < 1:
+            raise ParameterError(f"workers is {workers}; it must be at least 1.")
+        self._study = Study(experiments)
+        self._count = workers
+        self._deadline = deadline_s
+        self._memory_limit = None if memory_limit_mb is None else int(memory_limit_mb * 2**20)
+        self._recycle_runs = recycle_runs
+        self._recycle_growth = int(recycle_growth_mb * 2**20)
+        self._setup = Setup(
+            root=str(self._study.folder),
+            folder="",
+            memory_limit=self._memory_limit,
+            console_limit=console_limit,
+            kind=kind,
+            backend=backend,
+            reuse=reuse,
+            main=self._study.main,
+        )
+        self._events: Events = queue.SimpleQueue()
+        self._workers: list[WorkerProcess] = []
+        self._serials = itertools.count(1)
+        self._numbers = itertools.count(1)
+        self._failed_starts = 0
+        self._next_tick = 0.0
+        # Also at interpreter exit and when the runner is forgotten; must not refer to self.
+        self._finalizer = weakref.finalize(self, _shut_down, self._workers, self._study)
+        self._staff(workers)
+
+    # -- public ---------------------------------------------------------------------------------------
+    def run(self, jobs: Sequence[Job], on_outcome: OnOutcome | None = None) -> list[Outcome]:
+        """Run all jobs; see ``Runner.run``.
+
+        StudyError if workers cannot be started at all. KeyboardInterrupt, or whatever ``on_outcome``
+        raises, ends the batch: busy workers are killed, and the runner can be used again.
+        """
+        if not self._finalizer.alive:
+            raise StudyError("The runner is closed; open a new one.")
+        jobs = list(jobs)
+        check_jobs(jobs, self._study.descriptions)
+        batch = _Batch(jobs, on_outcome)
+        try:
+            for index, job in enumerate(jobs):
+                failure = self._study.failures.get(job.experiment)
+                if failure is None:
+                    batch.pending.append(index)
+                else:
+                    batch.finish(index, failure)
+            while batch.left:
+                self._staff(min(self._count, len(batch.pending) + len(batch.index)))
+                self._feed(batch)
+                self._wait(batch)
+        except BaseException:
+            for worker in [w for w in self._workers if w.assigned]:
+                self._dismiss(worker)
+            raise
+        return batch.result()
+
+    def close(self) -> None:
+        """Stop the workers and remove all folders; safe to call twice."""
+        self._finalizer()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # -- staff ----------------------------------------------------------------------------------------
+    def _staff(self, wanted: int) -> None:
+        present = sum(not w.is_leaving for w in self._workers)
+        for _ in range(present, wanted):
+            folder = self._study.folder / "workers" / str(next(self._numbers))
+            self._workers.append(WorkerProcess(self._setup, folder, self._events))
+
+    def _dismiss(self, worker: WorkerProcess) -> int:
+        """Kill and forget a worker; return its exit code."""
+        if worker in self._workers:
+            self._workers.remove(worker)
+        return worker.reap()
+
+    def _feed(self, batch: "_Batch") -> None:
+        """Give every worker one job, and a second one to have at hand while there are enough for all."""
+        for depth in (1, 2):
+            for worker in self._workers:
+                while (
+                    not worker.is_leaving
+                    and len(worker.assigned) < depth
+                    and len(batch.pending) >= (1 if depth == 1 else self._count)
+                ):
+                    index = batch.pending.popleft()
+                    job = batch.jobs[index]
+                    serial = next(self._serials)
+                    batch.index[serial] = index
+                    experiment = self._study.index[job.experiment]
+                    worker.give(Order(serial, experiment, dict(job.values), job.keep_signals))
+
+    # -- events ---------------------------------------------------------------------------------------
+    def _wait(self, batch: "_Batch") -> None:
+        """Handle one event, or a tick of the clock."""
+        try:
+            worker, message, at = self._events.get(timeout=self._patience())
+        except queue.Empty:
+            worker = None
+        if worker is not None and worker in self._workers:
+            match message:
+                case Ready(rss=rss):
+                    worker.is_ready, worker.idle_rss, worker.since = True, rss, at
+                    self._failed_starts = 0
+                case Done() as done:
+                    self._finished(worker, done, at, batch)
+                case None:
+                    self._died(worker, batch, None)
+        if time.monotonic() >= self._next_tick:
+            self._next_tick = time.monotonic() + _TICK_S
+            self._inspect(batch)
+
+    def _patience(self) -> float:
+        """Seconds until something has to be looked at."""
+        if self._deadline is None:
+            return _TICK_S
+        now = time.monotonic()
+        due = [w.since + self._deadline - now for w in self._workers if w.is_ready and w.assigned]
+        return max(0.001, min(due, default=_TICK_S)) if due and min(due) < _TICK_S else _TICK_S
+
+    def _finished(self, worker: WorkerProcess, done: Done, at: float, batch: "_Batch") -> None:
+        worker.assigned.popleft()
+        worker.since = at
+        worker.runs += 1
+        worker.is_leaving |= done.leaves
+        outcome = done.outcome
+        if worker.console_head:
+            outcome = _with_console(outcome, worker.console_head + outcome.console)
+            worker.console_head = ""
+        batch.finish(batch.index.pop(done.serial), outcome)
+        tired = worker.runs >= self._recycle_runs or done.rss - worker.idle_rss >= self._recycle_growth
+        if tired and not worker.is_leaving:
+            worker.is_leaving = True
+            worker.ask_to_stop()  # comes after the orders that it still has
+
+    def _inspect(self, batch: "_Batch") -> None:
+        """Kill workers that are late, too large, or do not start."""
+        now = time.monotonic()
+        for worker in list(self._workers):
+            growth = worker.watch()
+            worker.end_group_if_dead()
+            if not worker.is_ready:
+                if now - worker.since > _START_LIMIT_S:
+                    self._died(worker, batch, None)
+            elif not worker.assigned:
+                continue
+            elif self._deadline is not None and now - worker.since > self._deadline:
+                reason = f"the run was killed after {self._deadline:g} s"
+                self._died(worker, batch, (Status.TIMEOUT, reason))
+            elif self._memory_limit is not None and growth > 1.1 * self._memory_limit:
+                reason = f"the run outgrew {self._memory_limit / 2**20:.0f} MiB and was killed"
+                self._died(worker, batch, (Status.MEMORY, reason))
+
+    def _died(self, worker: WorkerProcess, batch: "_Batch", cause: tuple[Status, str] | None) -> None:
+        """Reap a worker; blame the job in work, if any, and put the others back to the front."""
+        progress = worker.progress()
+        console = worker.console()
+        code = self._dismiss(worker)
+        orders = list(worker.assigned)
+        worker.assigned.clear()
+        if not worker.is_ready:
+            self._failed_starts += 1
+            if self._failed_starts >= _FAILED_STARTS:
+                tail = " ".join(console.split())[-300:]
+                raise StudyError(f"Worker processes do not start (exit code {code}): {tail or 'no message'}.")
+        if orders and progress.serial == orders[0].serial:
+            order = orders.pop(0)
+            status, reason = cause or self._cause_of_death(code, progress)
+            lasted = time.monotonic() - worker.since
+            reason = f"{reason} {progress.where}"
+            batch.finish(batch.index.pop(order.serial), Outcome(status, reason, None, None, lasted, console))
+        for order in reversed(orders):
+            batch.pending.appendleft(batch.index.pop(order.serial))
+
+    def _cause_of_death(self, code: int, progress: Progress) -> tuple[Status, str]:
+        limit = self._memory_limit
+        if limit is not None and progress.growth >= 0.7 * limit:
+            return Status.MEMORY, f"the run outgrew {limit / 2**20:.0f} MiB and died"
+        if code >= 0:
+            return Status.EXIT, f"the FMU ended the process with exit code {code}"
+        try:
+            name = signal.Signals(-code).name
+        except ValueError:
+            name = f"signal {-code}"
+        return Status.CRASH, f"the process died by {name}"
+
+
+class _Batch:
+    """One call of ``run``: what is left to do."""
+
+    def __init__(self, jobs: list[Job], on_outcome: OnOutcome | None) -> None:
+        self.jobs = jobs
+        self.pending: deque[int] = deque()
+        self.index: dict[int, int] = {}
+        """Serial of an order -> index of its job, for orders in the hands of workers."""
+        self.left = len(jobs)
+        self._outcomes: list[Outcome | None] = [None] * len(jobs)
+        self._on_outcome = on_outcome
+
+    def finish(self, index: int, outcome: Outcome) -> None:
+        assert self._outcomes[index] is None
+        self._outcomes[index] = outcome
+        self.left -= 1
+        if self._on_outcome is not None:
+            self._on_outcome(index, outcome)
+
+    def result(self) -> list[Outcome]:
+        return [outcome for outcome in self._outcomes if outcome is not None]
+
+
+def _with_console(outcome: Outcome, console: str) -> Outcome:
+    return Outcome(
+        outcome.status, outcome.reason, outcome.signals, outcome.reduced, outcome.duration_s, console
+    )
+
+
+def _shut_down(workers: list[WorkerProcess], study: Study) -> None:
+    """Stop all workers, idle ones politely, and remove the study's folder."""
+    for worker in workers:
+        if not worker.assigned:
+            worker.ask_to_stop()
+    until = time.monotonic() + _CLOSE_S
+    for worker in workers:
+        worker.join(0.0 if worker.assigned or not worker.is_ready else until - time.monotonic())
+    workers.clear()
+    study.remove()

@@ -1,0 +1,51 @@
+"""How much memory a process uses, and a limit on it (Linux; elsewhere there is no limit)."""
+
+import contextlib
+import os
+import sys
+from pathlib import Path
+
+_PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
+
+
+def _statm(pid: int | str) -> list[int]:
+    with contextlib.suppress(OSError, ValueError):
+        return [int(field) * _PAGE for field in Path(f"/proc/{pid}/statm").read_text().split()]
+    return [0] * 7
+
+
+def resident_bytes(pid: int | str = "self") -> int:
+    """Resident set size, 0 if unknown."""
+    return _statm(pid)[1]
+
+
+def private_bytes() -> int:
+    """Private writable memory of this process (heap, data, anonymous mappings), 0 if unknown."""
+    return _statm("self")[5]
+
+
+def limit_growth(limit: int) -> int:
+    """Let this process's private writable memory grow by at most ``limit`` bytes; return what it has now.
+
+    RLIMIT_DATA counts heap and private mappings (Linux 4.7 and later), so neither shared libraries nor
+    numpy's and numba's address space reservations count, which makes RLIMIT_AS unusable for small limits.
+    """
+    present = private_bytes()
+    if not sys.platform.startswith("linux"):
+        return present
+    import resource
+
+    bound = present + limit
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    if hard != resource.RLIM_INFINITY:
+        bound = min(bound, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (bound, hard))
+    return present
+
+
+def no_core_files() -> None:
+    """A crashing FMU shall not leave core files behind."""
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

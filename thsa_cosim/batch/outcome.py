@@ -1,0 +1,29 @@
+"""What became of one job."""
+
+from dataclasses import dataclass
+
+from thsa_cosim.fmu.failure import Status
+from thsa_cosim.signals import FloatArray, Signals
+
+__all__ = ["Outcome", "Status"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one job. A failed simulation is an outcome, never an exception."""
+
+    status: Status
+    reason: str = ""
+    """One sentence for a failed run, empty for a good one."""
+    signals: Signals | None = None
+    reduced: FloatArray | None = None
+    """(k,) what the experiment's reducer returned."""
+    duration_s: float = 0.0
+    """Wall time of the run in the worker; of a killed run, until it was killed."""
+    console: str = ""
+    """What native code wrote to stdout and stderr, cut to a few thousand characters."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run succeeded."""
+        return self.status is Status.OK

@@ -1,0 +1,182 @@
+"""One worker process, seen from the runner."""
+
+import contextlib
+import json
+import os
+import queue
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+import numpy as np
+
+from thsa_cosim.batch.frames import Order, Setup, Stop, read_frame, write_frame
+from thsa_cosim.batch.memory import resident_bytes
+from thsa_cosim.batch.worker import GROWTH, PROGRESS_SLOTS, SERIAL, read_console
+from thsa_cosim.fmu.instance import Phase
+
+_BOOT = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from thsa_cosim.batch.worker import main; main()"
+_ONE_THREAD = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+)
+_FLOOD = 2**20
+"""Bytes of console output above which the file is emptied while the run goes on."""
+
+Events = queue.SimpleQueue[tuple["WorkerProcess", Any, float]]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a worker is."""
+
+    serial: int
+    """The job in work, 0 for none."""
+    where: str
+    growth: int
+    """Bytes by which the job in work has grown the process, if a limit is set."""
+
+
+class WorkerProcess:
+    """A spawned worker: sends orders, queues what comes back, explains its death.
+
+    Every message, and ``None`` when the worker is gone, is put into ``events`` with this object and the
+    time (``time.monotonic``) at which it came.
+    """
+
+    def __init__(self, setup: Setup, folder: Path, events: Events) -> None:
+        self.folder = folder
+        self.assigned: deque[Order] = deque()
+        """Orders sent and not yet answered; the first one is in work."""
+        self.is_ready = False
+        self.is_leaving = False
+        self.runs = 0
+        self.idle_rss = 0
+        self.since = time.monotonic()
+        """When the first of ``assigned`` began, as well as the parent can tell; before that, the start."""
+        self.console_head = ""
+        self.console_limit = setup.console_limit
+        (folder / "cwd").mkdir(parents=True)
+        self._progress_path = folder / "progress"
+        self._progress_path.write_bytes(bytes(8 * PROGRESS_SLOTS))
+        environment = os.environ | dict.fromkeys(_ONE_THREAD, "1")
+        with (folder / "console").open("ab") as console:
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", _BOOT, json.dumps([str(Path(p).absolute()) for p in sys.path])],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=console,
+                cwd=folder / "cwd",
+                env=environment,
+                start_new_session=True,
+            )
+        self._stdin = cast(BinaryIO, self._process.stdin)
+        self._stdout = cast(BinaryIO, self._process.stdout)
+        self._thread = threading.Thread(target=self._listen, args=(events,), daemon=True)
+        self._thread.start()
+        self._send(replace(setup, folder=str(folder)))
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    def _listen(self, events: Events) -> None:
+        while (message := read_frame(self._stdout)) is not None:
+            events.put((self, message, time.monotonic()))
+        events.put((self, None, time.monotonic()))
+
+    def _send(self, message: Any) -> None:
+        # A dead worker is noticed by its listener; what was sent to it is not lost but requeued.
+        with contextlib.suppress(OSError, ValueError):
+            write_frame(self._stdin, message)
+
+    def give(self, order: Order) -> None:
+        """Send an order; the worker runs it after those it already has."""
+        if self.is_ready and not self.assigned:
+            self.since = time.monotonic()
+        self.assigned.append(order)
+        self._send(order)
+
+    def progress(self) -> "Progress":
+        """Return how far the worker is; also after its death."""
+        values = np.zeros(PROGRESS_SLOTS)
+        with contextlib.suppress(OSError, ValueError):
+            values = np.frombuffer(self._progress_path.read_bytes(), dtype=np.float64)
+        phase = Phase(int(values[0]))
+        where = {
+            Phase.STEP: f"while stepping at t = {values[1]:.9g} s",
+            Phase.LOAD: "while loading the FMU",
+            Phase.INSTANTIATE: "while instantiating",
+            Phase.INITIALIZE: "while initialising",
+            Phase.TERMINATE: "while terminating",
+            Phase.FREE: "while freeing the instance",
+            Phase.RESET: "while resetting",
+            Phase.REDUCE: "in the cost",
+            Phase.IDLE: "after the run",
+        }
+        return Progress(int(values[SERIAL]), where[phase], int(values[GROWTH]))
+
+    def console(self) -> str:
+        """Return what the worker printed since its last finished run, cut."""
+        text = read_console(self.folder, self.console_limit)
+        return (self.console_head + text)[: self.console_limit + 64]
+
+    def watch(self) -> int:
+        """Stop floods of output; return by how many resident bytes the worker has grown."""
+        console = self.folder / "console"
+        with contextlib.suppress(OSError):
+            if console.stat().st_size > _FLOOD:
+                if not self.console_head:
+                    self.console_head = read_console(self.folder, self.console_limit)
+                os.truncate(console, 0)
+        return resident_bytes(self.pid) - self.idle_rss if self.idle_rss else 0
+
+    def reap(self) -> int:
+        """Kill what is left of the process and its children, remove its folder; return the exit code.
+
+        The exit code is negative for a signal, as in ``subprocess``.
+        """
+        if self._process.returncode is None:
+            if hasattr(os, "killpg"):
+                # Before the leader is waited for: until then its number cannot be given to another process.
+                with contextlib.suppress(OSError):
+                    os.killpg(self._process.pid, signal.SIGKILL)
+            else:
+                self._process.kill()
+            self._process.wait()
+        self._thread.join(5.0)
+        with contextlib.suppress(OSError):
+            self._stdin.close()
+        if not self._thread.is_alive():  # else a runaway grandchild holds the pipe, and close would block
+            self._stdout.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+        return int(self._process.returncode)
+
+    def end_group_if_dead(self) -> None:
+        """Kill the children of a worker that has died: they may hold its pipe open, which hides its death."""
+        if self._process.returncode is None and hasattr(os, "waitid"):
+            with contextlib.suppress(OSError):
+                if os.waitid(os.P_PID, self._process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:
+                    os.killpg(self._process.pid, signal.SIGKILL)
+
+    def ask_to_stop(self) -> None:
+        """Tell the worker to end after the orders that it has."""
+        self._send(Stop())
+
+    def join(self, patience_s: float) -> int:
+        """Wait for the worker to end by itself, then reap it."""
+        self._thread.join(max(patience_s, 0.0))
+        return self.reap()

@@ -1,0 +1,75 @@
+"""The temporary folder of one runner: each FMU unpacked once, each experiment written once."""
+
+import pickle
+import shutil
+import sys
+import tempfile
+from collections.abc import Sequence
+from multiprocessing import spawn
+from pathlib import Path
+from typing import Any
+
+from thsa_cosim.batch.job import Experiment
+from thsa_cosim.batch.outcome import Outcome, Status
+from thsa_cosim.batch.runner import by_name, check_experiment
+from thsa_cosim.errors import FmuError
+from thsa_cosim.fmu.archive import unpack
+from thsa_cosim.fmu.description import FmuDescription, read_description
+
+
+class Study:
+    """Experiments made ready for workers that share a file system.
+
+    ``folder``: fmus/<sha256>/ unpacked, experiments/<index>.pickle, workers/<number>/ (made by them).
+    An FMU that cannot be read is no error here: ``failures`` holds the outcome of all its jobs.
+    """
+
+    def __init__(self, experiments: Sequence[Experiment]) -> None:
+        self.experiments = by_name(experiments)
+        self.index = {name: i for i, name in enumerate(self.experiments)}
+        self.descriptions: dict[str, FmuDescription | None] = {}
+        self.failures: dict[str, Outcome] = {}
+        self.main: dict[str, Any] | None = None
+        self.folder = Path(tempfile.mkdtemp(prefix="thsa-cosim-"))
+        try:
+            self._prepare()
+        except BaseException:
+            self.remove()
+            raise
+
+    def _prepare(self) -> None:
+        (self.folder / "experiments").mkdir()
+        read: dict[Path, FmuDescription | FmuError] = {}
+        for name, experiment in self.experiments.items():
+            path = Path(experiment.fmu)
+            if path not in read:
+                read[path] = self._unpack(path)
+            found = read[path]
+            if isinstance(found, FmuError):
+                self.descriptions[name] = None
+                self.failures[name] = Outcome(Status.BAD_ARCHIVE, str(found).rstrip("."))
+                continue
+            check_experiment(experiment, found)
+            self.descriptions[name] = found
+            data = pickle.dumps((experiment, found, str(self._fmu_folder(found))), pickle.HIGHEST_PROTOCOL)
+            if b"__main__" in data and self.main is None:
+                self.main = spawn.get_preparation_data("thsa-cosim worker")
+                self.main["sys_path"] = list(sys.path)
+            (self.folder / "experiments" / f"{self.index[name]}.pickle").write_bytes(data)
+
+    def _fmu_folder(self, description: FmuDescription) -> Path:
+        return self.folder / "fmus" / description.sha256[:16]
+
+    def _unpack(self, path: Path) -> FmuDescription | FmuError:
+        try:
+            description = read_description(path)
+            folder = self._fmu_folder(description)
+            if not folder.exists():
+                unpack(path, folder)
+        except FmuError as error:
+            return error
+        return description
+
+    def remove(self) -> None:
+        """Remove the folder."""
+        shutil.rmtree(self.folder, ignore_errors=True)

@@ -1,0 +1,232 @@
+"""The worker process: runs jobs one after the other with one live FMU instance.
+
+Started as ``python -c BOOT`` by ``process.WorkerProcess``. Orders come in on stdin, results go out on what
+was stdout; file descriptors 1 and 2 are then pointed at the console file, so that nothing that native code
+prints can get between the messages.
+"""
+
+import contextlib
+import ctypes
+import mmap
+import os
+import pickle
+import queue
+import shutil
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from thsa_cosim.batch.frames import Done, Order, Ready, Setup, Stop, read_frame, write_frame
+from thsa_cosim.batch.job import Experiment
+from thsa_cosim.batch.memory import limit_growth, no_core_files, private_bytes, resident_bytes
+from thsa_cosim.batch.outcome import Outcome, Status
+from thsa_cosim.errors import ThsaCosimError
+from thsa_cosim.fmu.description import FmuDescription
+from thsa_cosim.fmu.failure import SimulationFailure
+from thsa_cosim.fmu.instance import Phase
+from thsa_cosim.fmu.plant import Plant
+from thsa_cosim.signals import Signals
+
+PROGRESS_SLOTS = 8
+SERIAL = 4
+"""Slot of the progress block that holds the serial of the job in work, 0 between jobs."""
+GROWTH = 5
+"""Slot that holds by how many bytes the job in work has grown this process, if a limit is set."""
+
+
+class Worker:
+    """Runs orders; ``serve`` is the main loop."""
+
+    def __init__(self, setup: Setup, results: BinaryIO) -> None:
+        self._setup = setup
+        self._results = results
+        self._cwd = Path(setup.folder) / "cwd"
+        with (Path(setup.folder) / "progress").open("r+b") as file:
+            self._map = mmap.mmap(file.fileno(), PROGRESS_SLOTS * 8)
+        self._progress = np.frombuffer(self._map, dtype=np.float64)
+        self._experiments: dict[int, tuple[Experiment, FmuDescription, str]] = {}
+        self._plants: dict[str, Plant] = {}
+        self._live: Plant | None = None
+        self._orders: queue.SimpleQueue[Order | Stop] = queue.SimpleQueue()
+        self._libc = None if os.name == "nt" else ctypes.CDLL(None)
+        self._floor = 0
+
+    def listen(self, orders: BinaryIO) -> None:
+        """Start the thread that reads orders ahead and notices when the parent dies."""
+
+        def listen() -> None:
+            while (message := read_frame(orders)) is not None:
+                self._orders.put(message)
+                if isinstance(message, Stop):
+                    return
+            self.parent_died()
+
+        threading.Thread(target=listen, daemon=True).start()
+
+    def parent_died(self) -> None:
+        """Remove the study's folder, as nobody else will, and end at once, whatever the FMU is doing."""
+        with contextlib.suppress(OSError):
+            os.chdir("/")
+        shutil.rmtree(self._setup.root, ignore_errors=True)
+        if hasattr(os, "killpg"):
+            os.killpg(0, signal.SIGKILL)  # this worker and whatever its FMU has started
+        os._exit(1)
+
+    def serve(self) -> None:
+        """Run orders until told to stop."""
+        self._warm_up()
+        if self._setup.memory_limit is not None:
+            self._floor = limit_growth(self._setup.memory_limit)
+            threading.Thread(target=self._watch_memory, daemon=True).start()
+        write_frame(self._results, Ready(resident_bytes()))
+        while not isinstance(order := self._orders.get(), Stop):
+            os.chdir(self._cwd)
+            self._progress[: GROWTH + 1] = (Phase.LOAD, np.nan, 0.0, 0.0, order.serial, 0.0)
+            outcome = self._run(order)
+            leaves = self._live is not None and self._live.is_dead
+            done = Done(order.serial, outcome, resident_bytes(), leaves)
+            try:
+                write_frame(self._results, done)
+            except OSError:
+                self.parent_died()
+            self._progress[SERIAL] = 0.0
+            if leaves:
+                break
+        if self._live is not None and not self._live.is_dead:
+            self._live.close()
+
+    def _warm_up(self) -> None:
+        """Load machine code before the first deadline starts to count."""
+        if self._setup.backend != "python":
+            with contextlib.suppress(Exception):
+                import thsa_cosim.fmu.compiled  # noqa: F401
+
+    def _run(self, order: Order) -> Outcome:
+        begin = time.perf_counter()
+        signals: Signals | None = None
+        reduced = None
+        status, reason = Status.OK, ""
+        try:
+            experiment, plant = self._experiment(order.experiment)
+            values = {**experiment.fixed, **order.values}
+            signals = plant.run(
+                values, experiment.inputs, experiment.outputs, experiment.time, tolerance=experiment.tolerance
+            )
+            if experiment.reduce is not None:
+                self._progress[0] = Phase.REDUCE
+                try:
+                    reduced = np.atleast_1d(np.asarray(experiment.reduce(signals), dtype=np.float64))
+                except Exception as error:
+                    status, reason = Status.COST_ERROR, f"the cost raised {_sentence(error)}"
+                if not order.keep_signals:
+                    signals = None
+        except SimulationFailure as failure:
+            status, reason = failure.status, failure.reason
+        except MemoryError:
+            status, reason = Status.MEMORY, "memory ran out"
+        except ThsaCosimError as error:
+            status, reason = Status.LOAD_ERROR, str(error).rstrip(".")
+        except Exception as error:
+            status, reason = Status.LOAD_ERROR, f"the run raised {_sentence(error)}"
+        status, reason = self._memory_verdict(status, reason)
+        return Outcome(status, reason, signals, reduced, time.perf_counter() - begin, self._console())
+
+    def _experiment(self, index: int) -> tuple[Experiment, Plant]:
+        if index not in self._experiments:
+            with (Path(self._setup.root) / "experiments" / f"{index}.pickle").open("rb") as file:
+                self._experiments[index] = pickle.load(file)
+        experiment, description, folder = self._experiments[index]
+        plant = self._plants.get(folder)
+        if plant is not self._live and self._live is not None:
+            self._live.close()  # one live instance per process
+        if plant is None:
+            setup: Any = self._setup
+            plant = Plant(
+                description,
+                Path(folder),
+                kind=setup.kind,
+                backend=setup.backend,
+                reuse=setup.reuse,
+                progress=self._progress[:4],
+                on_message=_to_stderr,
+            )
+            self._plants[folder] = plant
+        self._live = plant
+        return experiment, plant
+
+    def _watch_memory(self) -> None:
+        """Note the job's largest growth: when it dies of the limit, nobody can ask any more."""
+        while True:
+            growth = private_bytes() - self._floor
+            self._progress[GROWTH] = max(self._progress[GROWTH], growth)
+            time.sleep(0.02)
+
+    def _memory_verdict(self, status: Status, reason: str) -> tuple[Status, str]:
+        """Blame memory for a failure during which the process came near its limit."""
+        limit = self._setup.memory_limit
+        if limit is None or status in (Status.OK, Status.MEMORY) or self._progress[GROWTH] < 0.7 * limit:
+            return status, reason
+        return Status.MEMORY, f"the run outgrew {limit / 2**20:.0f} MiB and then failed: {reason}"
+
+    def _console(self) -> str:
+        """Return what was printed since the last run, cut; empty the console file and the scratch folder."""
+        sys.stdout.flush()
+        sys.stderr.flush()
+        if self._libc is not None:
+            self._libc.fflush(None)
+        for entry in os.scandir(self._cwd):
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry.path, ignore_errors=True)
+            else:
+                Path(entry.path).unlink(missing_ok=True)
+        if os.fstat(1).st_size == 0:
+            return ""
+        text = read_console(Path(self._setup.folder), self._setup.console_limit)
+        os.ftruncate(1, 0)
+        return text
+
+
+def read_console(folder: Path, limit: int) -> str:
+    """Return the first ``limit`` bytes of a worker's console file."""
+    with contextlib.suppress(OSError), (folder / "console").open("rb") as file:
+        text = file.read(limit).decode("utf-8", "replace")
+        more = os.fstat(file.fileno()).st_size - limit
+        return text + (f"\n... ({more} bytes cut)" if more > 0 else "")
+    return ""
+
+
+def _sentence(error: Exception) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())[:500]
+
+
+def _to_stderr(line: str) -> None:
+    os.write(2, line.encode("utf-8", "replace"))
+
+
+def main() -> None:
+    """Entry point of the process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    no_core_files()
+    # The pipes move to other descriptors (not inherited by what an FMU starts); 0, 1, 2 become harmless.
+    orders, results = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    setup = read_frame(orders)
+    if not isinstance(setup, Setup):
+        return
+    null = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(null, 0)
+    os.close(null)
+    os.dup2(2, 1)
+    worker = Worker(setup, results)
+    worker.listen(orders)
+    if setup.main is not None:
+        from multiprocessing import spawn
+
+        spawn.prepare(setup.main)
+    worker.serve()
+    results.close()
+    os._exit(0)  # native destructors and threads of an FMU could still crash or hang

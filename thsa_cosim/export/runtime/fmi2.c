@@ -29,30 +29,10 @@ static void emit(Instance *c, Status status, const char *category, const char *m
         self->callbacks.logger(self->callbacks.componentEnvironment, self->name, (fmi2Status)status, category, message);
 }
 
-/* Whether the call is allowed; kind 0 = both. */
-static int allowed(fmi2Component component, const char *function, int phases, int kind) {
-    Component *self = component;
-    if (!self) return 0;
-    if (kind && (int)self->core.kind != kind)
-        instance_log(&self->core, FAILED, LOG_ERROR, "%s: only for %s", function,
-                     kind == CO_SIMULATION ? "Co-Simulation" : "Model Exchange");
-    else if (!(self->core.s.phase & phases))
-        instance_log(&self->core, FAILED, LOG_ERROR, "%s: not allowed in this state", function);
-    else
-        return 1;
-    return 0;
-}
-
-static int given(fmi2Component component, const char *function, size_t n, const void *first, const void *second) {
-    if (n == 0 || (first && second)) return 1;
-    instance_log(component, FAILED, LOG_ERROR, "%s: an array is missing (NULL)", function);
-    return 0;
-}
-
 #define REQUIRE(phases, kind) \
-    do { if (!allowed(c, __func__, phases, kind)) return fmi2Error; } while (0)
+    do { if (!instance_allowed(c, __func__, phases, kind)) return fmi2Error; } while (0)
 #define REQUIRE_ARRAYS(n, first, second) \
-    do { if (!given(c, __func__, n, first, second)) return fmi2Error; } while (0)
+    do { if (!instance_given(c, __func__, n, first, second)) return fmi2Error; } while (0)
 #define CORE (&((Component *)c)->core)
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -60,23 +40,9 @@ const char *fmi2GetVersion(void) { return fmi2Version; }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
-    unsigned wanted = 0;
     REQUIRE(ANY, 0);
     REQUIRE_ARRAYS(nCategories, categories, categories);
-    for (size_t i = 0; i < nCategories; i++) {
-        unsigned bits = categories[i] && strcmp(categories[i], "logAll") == 0 ? (unsigned)LOG_ALL : 0u;
-        for (int k = 0; k < 6; k++)
-            if (categories[i] && strcmp(categories[i], category_names[k]) == 0) bits = 1u << k;
-        if (!bits) {
-            instance_log(CORE, FAILED, LOG_ERROR, "fmi2SetDebugLogging: unknown category %.60s",
-                         categories[i] ? categories[i] : "(NULL)");
-            return fmi2Error;
-        }
-        wanted |= bits;
-    }
-    if (nCategories == 0) wanted = LOG_ALL;
-    CORE->categories = loggingOn ? CORE->categories | wanted : CORE->categories & ~wanted;
-    return fmi2OK;
+    return (fmi2Status)instance_set_logging(CORE, loggingOn, nCategories, categories);
 }
 
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
@@ -168,7 +134,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
 
 /* The model has Real variables only: empty requests are fine, any value reference is an error. */
 static fmi2Status no_such_type(fmi2Component c, const char *function, int phases, size_t nvr) {
-    if (!allowed(c, function, phases, 0)) return fmi2Error;
+    if (!instance_allowed(c, function, phases, 0)) return fmi2Error;
     if (nvr == 0) return fmi2OK;
     instance_log(c, FAILED, LOG_ERROR, "%s: this model has Real variables only", function);
     return fmi2Error;
@@ -266,14 +232,14 @@ fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation) {
+    int missed;
     (void)noSetFMUStatePriorToCurrentPoint;
     REQUIRE(CONTINUOUS, MODEL_EXCHANGE);
     REQUIRE_ARRAYS(1, enterEventMode, terminateSimulation);
     *terminateSimulation = fmi2False;
     *enterEventMode = fmi2False;
-    if (instance_indicators(CORE) != OK) return fmi2Discard;
-    for (int k = 0; k < N_G; k++) /* an event that the importer has not located */
-        if ((instance_indicator(CORE, k) > 0.0) != (CORE->s.now.m[k] > 0.5)) *enterEventMode = fmi2True;
+    if (instance_missed_event(CORE, &missed) != OK) return fmi2Discard;
+    if (missed) *enterEventMode = fmi2True;
     return fmi2OK;
 }
 
@@ -288,47 +254,30 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
     return (fmi2Status)instance_set_states(CORE, x, nx);
 }
 
-static fmi2Status copy_out(fmi2Component c, const double *from, size_t expected, double *to, size_t n) {
-    if (n != expected) {
-        instance_log(c, FAILED, LOG_ERROR, "the array has the wrong length");
-        return fmi2Error;
-    }
-    if (n) memcpy(to, from, n * sizeof *to);
-    return fmi2OK;
-}
+#define CONTINUOUS_READABLE (INITIALIZATION | EVENT_MODE | CONTINUOUS | TERMINATED | IN_ERROR)
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
-    Status status;
-    REQUIRE(INITIALIZATION | EVENT_MODE | CONTINUOUS | TERMINATED | IN_ERROR, MODEL_EXCHANGE);
+    REQUIRE(CONTINUOUS_READABLE, MODEL_EXCHANGE);
     REQUIRE_ARRAYS(nx, derivatives, derivatives);
-    if ((status = instance_settle(CORE)) != OK || (status = instance_derivatives(CORE)) != OK)
-        return (fmi2Status)status;
-    return copy_out(c, CORE->dx, N_X, derivatives, nx);
+    return (fmi2Status)instance_copy(CORE, COPY_DERIVATIVES, derivatives, nx);
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
-    double shifted[N_G + 1];
-    Status status;
-    REQUIRE(INITIALIZATION | EVENT_MODE | CONTINUOUS | TERMINATED | IN_ERROR, MODEL_EXCHANGE);
+    REQUIRE(CONTINUOUS_READABLE, MODEL_EXCHANGE);
     REQUIRE_ARRAYS(ni, eventIndicators, eventIndicators);
-    if ((status = instance_settle(CORE)) != OK || (status = instance_indicators(CORE)) != OK)
-        return (fmi2Status)status;
-    for (int k = 0; k < N_G; k++) shifted[k] = instance_indicator(CORE, k);
-    return copy_out(c, shifted, N_G, eventIndicators, ni);
+    return (fmi2Status)instance_copy(CORE, COPY_INDICATORS, eventIndicators, ni);
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
-    Status status;
-    REQUIRE(INITIALIZATION | EVENT_MODE | CONTINUOUS | TERMINATED | IN_ERROR, MODEL_EXCHANGE);
+    REQUIRE(CONTINUOUS_READABLE, MODEL_EXCHANGE);
     REQUIRE_ARRAYS(nx, x, x);
-    if ((status = instance_settle(CORE)) != OK) return (fmi2Status)status;
-    return copy_out(c, CORE->s.now.x, N_X, x, nx);
+    return (fmi2Status)instance_copy(CORE, COPY_STATES, x, nx);
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
-    REQUIRE(INSTANTIATED | INITIALIZATION | EVENT_MODE | CONTINUOUS | TERMINATED | IN_ERROR, MODEL_EXCHANGE);
+    REQUIRE(INSTANTIATED | CONTINUOUS_READABLE, MODEL_EXCHANGE);
     REQUIRE_ARRAYS(nx, x_nominal, x_nominal);
-    return copy_out(c, model_x_nominal, N_X, x_nominal, nx);
+    return (fmi2Status)instance_copy(CORE, COPY_NOMINALS, x_nominal, nx);
 }
 
 /* Co-Simulation */

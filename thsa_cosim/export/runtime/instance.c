@@ -30,6 +30,41 @@ void instance_log(Instance *c, Status status, Category category, const char *for
     c->emit(c, status, category_names[bit], text);
 }
 
+Status instance_set_logging(Instance *c, int on, size_t n, const char *const categories[]) {
+    unsigned wanted = n ? 0u : (unsigned)LOG_ALL;
+    for (size_t i = 0; i < n; i++) {
+        const char *name = categories[i] ? categories[i] : "(NULL)";
+        unsigned bits = strcmp(name, "logAll") == 0 ? (unsigned)LOG_ALL : 0u;
+        for (int k = 0; k < 6; k++)
+            if (strcmp(name, category_names[k]) == 0) bits = 1u << k;
+        if (!bits) {
+            instance_log(c, FAILED, LOG_ERROR, "unknown log category %.60s", name);
+            return FAILED;
+        }
+        wanted |= bits;
+    }
+    c->categories = on ? c->categories | wanted : c->categories & ~wanted;
+    return OK;
+}
+
+int instance_allowed(Instance *c, const char *function, int phases, int kind) {
+    if (!c) return 0;
+    if (kind && (int)c->kind != kind)
+        instance_log(c, FAILED, LOG_ERROR, "%s: only for %s", function,
+                     kind == CO_SIMULATION ? "Co-Simulation" : "Model Exchange");
+    else if (!(c->s.phase & phases))
+        instance_log(c, FAILED, LOG_ERROR, "%s: not allowed in this state", function);
+    else
+        return 1;
+    return 0;
+}
+
+int instance_given(Instance *c, const char *function, size_t n, const void *first, const void *second) {
+    if (n == 0 || (first && second)) return 1;
+    instance_log(c, FAILED, LOG_ERROR, "%s: an array is missing (NULL)", function);
+    return 0;
+}
+
 static Status fail(Instance *c, Status status, const char *why) {
     instance_log(c, status, status == DISCARD ? LOG_DISCARD : LOG_ERROR, "%s at time %.15g", why, c->s.now.time);
     return status;
@@ -173,6 +208,27 @@ Status instance_indicators(Instance *c) {
     return OK;
 }
 
+Status instance_missed_event(Instance *c, int *missed) {
+    *missed = 0;
+    if (instance_indicators(c) != OK) return DISCARD;
+    for (int k = 0; k < N_G; k++) *missed |= (instance_indicator(c, k) > 0.0) != (c->s.now.m[k] > 0.5);
+    return OK;
+}
+
+Status instance_copy(Instance *c, Copy what, double *out, size_t n) {
+    Status status = what == COPY_NOMINALS ? OK : instance_settle(c);
+    if (n != (what == COPY_INDICATORS ? N_G : N_X)) return fail(c, FAILED, "an array has the wrong length");
+    if (status == OK && what == COPY_DERIVATIVES) status = instance_derivatives(c);
+    if (status == OK && what == COPY_INDICATORS) status = instance_indicators(c);
+    if (status != OK) return status;
+    for (size_t k = 0; k < n; k++)
+        out[k] = what == COPY_STATES        ? c->s.now.x[k]
+                 : what == COPY_DERIVATIVES ? c->dx[k]
+                 : what == COPY_INDICATORS  ? instance_indicator(c, (int)k)
+                                            : model_x_nominal[k];
+    return OK;
+}
+
 static Status evaluate_outputs(Instance *c) {
     const State *s = &c->s;
     if (c->w_valid || c->y_valid) return OK;
@@ -237,6 +293,8 @@ Status instance_get(Instance *c, const unsigned *vr, size_t n, double *values) {
     }
     return OK;
 }
+
+int instance_is_input(unsigned vr) { return within(vr, VR_U, N_U) >= 0; }
 
 /* NULL = may be set now; otherwise the reason why not. */
 static const char *not_settable(const State *s, unsigned vr) {

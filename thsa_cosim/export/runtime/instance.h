@@ -47,7 +47,6 @@ typedef struct {
     int dependent_due;       /* p changed: d is out of date */
     int initial_due;         /* initial equations not solved for the present start values */
     int modes_due;           /* inputs or parameters jumped: relations have to be checked (Co-Simulation) */
-    int event_mode_used;     /* FMI 3 Co-Simulation with Event Mode */
 } State;
 
 typedef struct Instance Instance;
@@ -56,7 +55,6 @@ struct Instance {
     State s;
     Kind kind;
     unsigned categories;     /* enabled log categories */
-    void *layer;             /* owned by fmi2.c or fmi3.c */
     void (*emit)(Instance *, Status, const char *category, const char *message);
     void (*before_step)(Instance *, double time);  /* FMI 3 intermediate update: inputs wanted at `time` */
     void (*after_step)(Instance *);                /* FMI 3 intermediate update: an internal step is done */
@@ -86,6 +84,10 @@ void instance_log(Instance *c, Status status, Category category, const char *for
 #endif
     ;
 
+Status instance_set_logging(Instance *c, int on, size_t n, const char *const categories[]);
+int instance_allowed(Instance *c, const char *function, int phases, int kind); /* kind 0: both; logs a refusal */
+int instance_given(Instance *c, const char *function, size_t n, const void *first, const void *second);
+
 void instance_reset(Instance *c);       /* as freshly instantiated; logging stays */
 void instance_changed(Instance *c);     /* the point changed: caches are void */
 Status instance_setup(Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined, double stop);
@@ -94,11 +96,15 @@ Status instance_update_modes(Instance *c);       /* event iteration at the prese
 Status instance_settle(Instance *c);             /* bring d, x, m up to date as the phase demands */
 Status instance_derivatives(Instance *c);        /* fills c->dx */
 Status instance_indicators(Instance *c);         /* fills c->g */
+Status instance_missed_event(Instance *c, int *missed); /* has a relation changed its sign since its mode was set? */
+typedef enum { COPY_STATES, COPY_DERIVATIVES, COPY_INDICATORS, COPY_NOMINALS } Copy;
+Status instance_copy(Instance *c, Copy what, double *out, size_t n); /* Model Exchange vectors */
 double instance_indicator(const Instance *c, int k); /* g[k] shifted by its dead band: never 0 */
 double instance_dead_band(const Instance *c, int k);
 
 Status instance_get(Instance *c, const unsigned *vr, size_t n, double *values);
 Status instance_set(Instance *c, const unsigned *vr, size_t n, const double *values);
+int instance_is_input(unsigned vr);
 Status instance_set_states(Instance *c, const double *x, size_t n);
 Status instance_set_time(Instance *c, double time);
 Status instance_set_input_derivatives(Instance *c, const unsigned *vr, size_t n, const int *order, const double *values);

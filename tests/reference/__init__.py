@@ -1,1 +1,1 @@
-"""An independent plant of the rig: the equations written by hand, integrated by SciPy, no FMU and no Modelica."""
+"""An independent plant of the rig: equations written by hand, integrated by SciPy, no FMU and no Modelica."""

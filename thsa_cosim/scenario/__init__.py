@@ -1,0 +1,32 @@
+"""A scenario: one TOML file that says what to run and what to compare it with, checked in one place.
+
+``schema`` holds the file's tables (one pydantic class each, one class per kind), ``model`` the frozen objects
+that the use cases get, ``load`` turns the one into the other, ``check`` holds a scenario against its FMU and
+``sentences`` turns a wrong key or value into one sentence.
+"""
+
+from thsa_cosim.scenario.load import load_scenario
+from thsa_cosim.scenario.model import (
+    Channel,
+    CostSpec,
+    LawSpec,
+    Scenario,
+    SearchSpec,
+    SimulationSpec,
+    Stage,
+    TemperaturePoint,
+)
+from thsa_cosim.scenario.schema import KINDS
+
+__all__ = [
+    "KINDS",
+    "Channel",
+    "CostSpec",
+    "LawSpec",
+    "Scenario",
+    "SearchSpec",
+    "SimulationSpec",
+    "Stage",
+    "TemperaturePoint",
+    "load_scenario",
+]

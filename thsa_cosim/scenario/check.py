@@ -1,0 +1,211 @@
+"""A scenario against its FMU: every variable exists, has the right role, unit and range."""
+
+import fnmatch
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from thsa_cosim.errors import ParameterError, ScenarioError, UnitError, did_you_mean
+from thsa_cosim.fmu import FmuDescription, Variable
+from thsa_cosim.parameters import Parameter, ParameterSpace
+from thsa_cosim.scenario.schema import CommonTable, IdentifyTable, ParameterTable, SimulateTable
+from thsa_cosim.ssv import read_ssv
+from thsa_cosim.units import convert
+
+_SETTABLE = ("parameter", "structuralParameter")
+
+
+def _variable(fmu: FmuDescription, name: str, key: str, candidates: tuple[Variable, ...] = ()) -> Variable:
+    """Return the FMU's variable; ScenarioError with the closest of ``candidates`` (default: all)."""
+    if name in fmu.variables:
+        return fmu.variables[name]
+    known = [v.name for v in candidates] or list(fmu.variables)
+    hint = did_you_mean(name, known)
+    if not hint and 0 < len(known) <= 12:
+        hint = f" It has {', '.join(known)}."
+    raise ScenarioError(f"{key}: {fmu.path.name} has no variable {name!r}.{hint}")
+
+
+def roles(table: CommonTable, fmu: FmuDescription) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the FMU's inputs and the measured outputs among ``recordings.columns``.
+
+    Raises
+    ------
+    ScenarioError
+        If a column belongs to no signal of the FMU, an input has no column, or the temperature's is missing.
+    """
+    columns = table.recordings.columns
+    inputs, measured = [], []
+    for name, column in columns.items():
+        key = f"recordings.columns.{name}"
+        variable = _variable(fmu, name, key, fmu.inputs + fmu.outputs)
+        if variable.causality == "input":
+            inputs.append(name)
+        elif variable.causality in ("output", "local") and variable.type != "String":
+            if column.column is None:
+                raise ScenarioError(f"{key} is an output, which cannot be a constant; name its column.")
+            measured.append(name)
+        else:
+            raise ScenarioError(f"{key} is a {variable.causality} of {fmu.path.name}; set it in [fixed].")
+    for wanted in fmu.inputs:
+        if wanted.name not in columns and wanted.is_float:
+            raise ScenarioError(
+                f"recordings.columns.{wanted.name} is missing: input {wanted.name!r} of {fmu.path.name} needs"
+                f" a column or a value."
+            )
+    source = table.temperature.input if table.temperature else None
+    if source is not None and source not in columns:
+        _variable(fmu, source, "temperature.input", fmu.inputs)
+        raise ScenarioError(f"temperature.input {source!r} has no column; add [recordings.columns.{source}].")
+    return tuple(inputs), tuple(measured)
+
+
+def outputs(table: CommonTable, fmu: FmuDescription, measured: tuple[str, ...]) -> tuple[str, ...]:
+    """Return what is simulated: the measured outputs and, for ``simulate``, those that it asks for."""
+    if not isinstance(table, SimulateTable):
+        return measured
+    for name in table.outputs:
+        variable = _variable(fmu, name, "outputs", fmu.outputs)
+        if variable.type == "String":
+            raise ScenarioError(f"outputs: {name!r} of {fmu.path.name} is a text; only numbers are recorded.")
+    own = tuple(v.name for v in fmu.outputs if v.type != "String" and not v.is_array)
+    return tuple(dict.fromkeys((*measured, *(table.outputs or own))))
+
+
+def parameters(table: IdentifyTable, fmu: FmuDescription) -> tuple[tuple[Parameter, str], ...]:
+    """Return each parameter in the FMU's terms, and whether it is one per point or per recording.
+
+    Raises
+    ------
+    ScenarioError, ParameterError, UnitError
+        If the variable is no parameter of the FMU, the unit does not convert, or the bounds leave the FMU's.
+    """
+    found = []
+    for p in table.parameters:
+        key = f"parameters[{p.name}].variable"
+        variable = _settable(fmu, p.variable, key)
+        if not variable.is_float:
+            raise ScenarioError(
+                f"{key}: {p.variable!r} is a {variable.type}; only real numbers are searched."
+            )
+        plain = Parameter(
+            p.name,
+            p.variable,
+            p.unit,
+            p.lower,
+            p.upper,
+            p.scale,
+            p.start,
+            p.description,
+            variable.unit or None,
+        )
+        low, high = sorted((plain.to_variable(p.lower), plain.to_variable(p.upper)))
+        for key_name, value in (("lower", low), ("upper", high)):
+            _check_range(variable, value, f"parameters[{p.name}].{key_name}", fmu)
+        found.append((replace(plain, description=p.description or variable.description), p.per))
+    return tuple(found)
+
+
+def _settable(fmu: FmuDescription, name: str, key: str) -> Variable:
+    variable = _variable(fmu, name, key, fmu.parameters)
+    start_value = variable.initial in ("exact", "approx") and variable.causality in ("local", "output")
+    if variable.causality in _SETTABLE or (start_value and variable.variability != "constant"):
+        return variable
+    remedy = (
+        f"give it in [recordings.columns.{name}]" if variable.causality == "input" else "choose a parameter"
+    )
+    raise ScenarioError(
+        f"{key}: {name!r} is a {variable.causality} of {fmu.path.name}, no parameter; {remedy}."
+    )
+
+
+def _check_range(variable: Variable, value: float, key: str, fmu: FmuDescription) -> None:
+    below = variable.minimum is not None and value < variable.minimum - 1e-12 * abs(variable.minimum)
+    above = variable.maximum is not None and value > variable.maximum + 1e-12 * abs(variable.maximum)
+    if below or above:
+        limit = f"min = {variable.minimum:g}" if below else f"max = {variable.maximum:g}"
+        raise ParameterError(
+            f"{key}: {value:g} {variable.unit or ''}".rstrip()
+            + f" is outside what {fmu.path.name} allows for {variable.name!r} ({limit})."
+        )
+
+
+def fixed(path: Path, table: CommonTable, fmu: FmuDescription, space: ParameterSpace) -> dict[str, float]:
+    """Return FMU start values: the parameter set's, overridden by zeroed coefficients, then by ``[fixed]``.
+
+    Raises
+    ------
+    ScenarioError, ParameterError, UnitError
+        If a variable is no parameter, a glob matches none, or a value is searched for as well.
+    """
+    values = _parameter_set(path, table, fmu)
+    searched = {p.variable: p.name for p in space.parameters}
+    own: dict[str, float] = {}
+    for name, value in table.fixed.items():
+        key = f"fixed.{_quoted(name)}"
+        variable = _settable(fmu, name, key)
+        _check_range(variable, float(value), key, fmu)
+        if name in searched:
+            raise ScenarioError(f"{key} is searched for as parameter {searched[name]!r}; remove one of them.")
+        own[name] = float(value)
+    zeroed: dict[str, float] = {}
+    for parameter in table.parameters if isinstance(table, IdentifyTable) else ():
+        for name in _zeroed(fmu, parameter):
+            if name not in searched:
+                zeroed[name] = 0.0
+        for pattern in parameter.zero:
+            if pattern in own and own[pattern] != 0.0:
+                raise ScenarioError(
+                    f"parameters[{parameter.name}].zero sets {pattern!r} to 0, [fixed] to {own[pattern]:g};"
+                    f" remove one of them."
+                )
+    merged = {**values, **zeroed, **own}
+    return {name: value for name, value in merged.items() if name not in searched}
+
+
+def _zeroed(fmu: FmuDescription, parameter: ParameterTable) -> list[str]:
+    """Return the FMU parameters that ``zero`` (names and globs) and ``law_block`` set to 0."""
+    settable = [v.name for v in fmu.parameters if v.is_float]
+    names: list[str] = []
+    for pattern in parameter.zero:
+        if pattern in fmu.variables:
+            names.append(_settable(fmu, pattern, f"parameters[{parameter.name}].zero").name)
+        elif matches := fnmatch.filter(settable, pattern):
+            names += matches
+        else:
+            raise ScenarioError(
+                f"parameters[{parameter.name}].zero: {pattern!r} matches no parameter of {fmu.path.name}."
+                f"{did_you_mean(pattern, settable)}"
+            )
+    if parameter.law_block is not None:
+        inside = [n for n in settable if n.rpartition(".")[0] == parameter.law_block]
+        if not inside:
+            blocks = {n.rpartition(".")[0] for n in settable} - {""}
+            raise ScenarioError(
+                f"parameters[{parameter.name}].law_block: {fmu.path.name} has no block"
+                f" {parameter.law_block!r} with parameters.{did_you_mean(parameter.law_block, blocks)}"
+            )
+        names += inside
+    return [n for n in names if n != parameter.variable]
+
+
+def _parameter_set(path: Path, table: CommonTable, fmu: FmuDescription) -> dict[str, float]:
+    if table.parameter_set is None:
+        return {}
+    file = path.parent / table.parameter_set
+    given = read_ssv(file)
+    values: Mapping[str, float] = given.values
+    result = {}
+    for name, value in values.items():
+        variable = _settable(fmu, name, f"parameter_set ({file.name})")
+        try:
+            unit = given.units.get(name)
+            result[name] = convert(value, unit, variable.unit) if unit and variable.unit else value
+        except UnitError as error:
+            raise UnitError(f"{file}: {name!r}: {error}") from None
+        _check_range(variable, result[name], f"parameter_set ({file.name})", fmu)
+    return result
+
+
+def _quoted(name: str) -> str:
+    return f'"{name}"' if "." in name else name

@@ -1,0 +1,250 @@
+"""From the TOML file to a :class:`Scenario`: files found and read, units converted, everything checked."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from thsa_cosim.errors import InputError, ScenarioError, did_you_mean
+from thsa_cosim.fmu import FmuDescription, read_description
+from thsa_cosim.parameters import ParameterSpace
+from thsa_cosim.recordings import Column, Recording, TimeAxis, read_recording
+from thsa_cosim.scenario import check
+from thsa_cosim.scenario.files import expand, named
+from thsa_cosim.scenario.model import (
+    Channel,
+    CostSpec,
+    LawSpec,
+    Scenario,
+    SearchSpec,
+    SimulationSpec,
+    TemperaturePoint,
+)
+from thsa_cosim.scenario.schema import KINDS, CommonTable, IdentifyTable, SimulateTable, TemperatureTable
+from thsa_cosim.scenario.sentences import from_validation, one_line
+
+
+def load_scenario(
+    path: Path | str,
+    *,
+    fit: Sequence[Path | str] = (),
+    validate: Sequence[Path | str] = (),
+    seed: int | None = None,
+    fmu: FmuDescription | Path | str | None = None,
+) -> Scenario:
+    """Read, check and resolve a scenario file.
+
+    Parameters
+    ----------
+    path
+        The TOML file; paths in it are relative to it.
+    fit, validate
+        Recordings (or globs, relative to the working directory) instead of the scenario's own.
+    seed
+        Replaces the scenario's seed.
+    fmu
+        An FMU, or its description, instead of the scenario's own.
+
+    Raises
+    ------
+    ScenarioError
+        For a key, value or reference that is wrong.
+    FmuError, RecordingError, ParameterError, UnitError, MissingExtraError
+        As the files that it names deserve. Every message is one line.
+    """
+    path = Path(path)
+    data = read_toml(path)
+    table = parse(path, data)
+    try:
+        return _resolve(path, table, fit, validate, seed, fmu)
+    except InputError as error:
+        message = str(error) if str(path) in str(error) else f"{path}: {error}"
+        raise type(error)(one_line(message)) from None
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the file's tables; ScenarioError if it is missing or no TOML."""
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        try:
+            near = did_you_mean(path.name, [p.name for p in path.parent.iterdir()])
+        except OSError:
+            near = ""
+        raise ScenarioError(one_line(f"{path}: no such scenario file; check the path.{near}")) from None
+    except UnicodeDecodeError:
+        raise ScenarioError(one_line(f"{path}: is not UTF-8 text; save it as UTF-8.")) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise ScenarioError(one_line(f"{path}: cannot be read ({reason}).")) from None
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        raise ScenarioError(one_line(f"{path}: is no valid TOML ({error}); correct it.")) from None
+
+
+def parse(path: Path, data: Mapping[str, Any]) -> CommonTable:
+    """Return the tables as their kind's pydantic model; ScenarioError in one sentence."""
+    kind = data.get("kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        what = "is missing" if kind is None else f"is {kind!r}"
+        hint = did_you_mean(kind, KINDS) if isinstance(kind, str) else ""
+        if kind is None:
+            misspelt = next((k for k in data if did_you_mean(k, ["kind"])), None)
+            what += f" ({misspelt!r} is no key)" if misspelt else ""
+        supported = " or ".join(f'"{k}"' for k in KINDS)
+        raise ScenarioError(one_line(f"{path}: kind {what}; supported kinds are {supported}.{hint}"))
+    try:
+        return KINDS[kind].model_validate(data)
+    except ValidationError as error:
+        raise from_validation(path, data, error) from None
+
+
+def _resolve(
+    path: Path,
+    table: CommonTable,
+    fit: Sequence[Path | str],
+    validate: Sequence[Path | str],
+    seed: int | None,
+    fmu: FmuDescription | Path | str | None,
+) -> Scenario:
+    folder = path.parent
+    description = fmu if isinstance(fmu, FmuDescription) else read_description(fmu or folder / table.fmu)
+    inputs, measured = check.roles(table, description)
+    parameters = check.parameters(table, description) if isinstance(table, IdentifyTable) else ()
+    space = ParameterSpace(tuple(p for p, _ in parameters))
+    fixed = check.fixed(path, table, description, space)
+    outputs = check.outputs(table, description, measured)
+    cost = _cost(table, measured, inputs)
+    files = {
+        "fit": expand(path, "recordings.fit", table.recordings.fit, fit),
+        "validate": expand(path, "recordings.validate", table.recordings.validate_, validate),
+    }
+    if both := set(files["fit"]) & set(files["validate"]):
+        raise ScenarioError(
+            f"{min(both)} is both a fit and a validate recording; remove it from one of them."
+        )
+    if not files["fit"] and not (isinstance(table, SimulateTable) and files["validate"]):
+        raise ScenarioError("recordings.fit names no recording; add one.")
+    read = {role: _recordings(table, paths, description) for role, paths in files.items()}
+    per_recording = [p.name for p, where in parameters if where == "recording"]
+    scenario = Scenario(
+        kind=table.kind,
+        path=path,
+        title=table.title,
+        seed=table.seed if seed is None else seed,
+        fmu=description,
+        fit=read["fit"],
+        validate=read["validate"],
+        points=_points(table.temperature, read["fit"], read["validate"], fixed, space, per_recording),
+        inputs=inputs,
+        measured=measured,
+        outputs=outputs,
+        fixed=fixed,
+        parameters=space,
+        laws=_laws(table),
+        cost=cost,
+        search=_search(table, space),
+        simulation=_simulation(table),
+        round_to=table.temperature.round_to if table.temperature else 1.0,
+    )
+    if isinstance(table, IdentifyTable):
+        for recording in scenario.fit:
+            for channel in cost.channels:
+                scenario.noise(recording, channel)
+    return scenario
+
+
+def _recordings(
+    table: CommonTable, paths: Sequence[Path], description: FmuDescription
+) -> tuple[Recording, ...]:
+    columns = {name: Column(**column.model_dump()) for name, column in table.recordings.columns.items()}
+    units = {name: description.variables[name].unit or None for name in columns}
+    source = table.temperature
+    temperature: str | Column | None = None
+    if source is not None:
+        temperature = source.input or Column(column=source.column, unit=source.unit)
+    axis = TimeAxis(**table.recordings.time.model_dump())
+    return tuple(
+        read_recording(path, columns, time=axis, units=units, temperature=temperature, name=name)
+        for path, name in named(paths)
+    )
+
+
+def _points(
+    temperature: TemperatureTable | None,
+    fit: Sequence[Recording],
+    validate: Sequence[Recording],
+    fixed: Mapping[str, float],
+    space: ParameterSpace,
+    per_recording: Sequence[str],
+) -> tuple[TemperaturePoint, ...]:
+    """Group recordings by rounded temperature, coldest first, or all of them together."""
+
+    def rounded(recording: Recording) -> float | None:
+        if temperature is None or temperature.group == "joint" or recording.temperature_degC is None:
+            return None
+        return round(recording.temperature_degC / temperature.round_to) * temperature.round_to + 0.0
+
+    groups = dict.fromkeys(rounded(r) for r in (fit or validate))
+    points = []
+    for value in sorted(groups, key=lambda t: -1e9 if t is None else t):
+        members = tuple(r for r in fit if rounded(r) == value)
+        held_out = tuple(r for r in validate if rounded(r) == value)
+        searched = space.for_recordings([r.name for r in members], per_recording)
+        points.append(TemperaturePoint(value, members, held_out, fixed, searched))
+    return tuple(points)
+
+
+def _laws(table: CommonTable) -> dict[str, LawSpec]:
+    if not isinstance(table, IdentifyTable):
+        return {}
+    return {
+        p.name: LawSpec(
+            p.law.form,
+            tuple(p.law.published) if p.law.published is not None else None,
+            p.law.published_form or p.law.form,
+        )
+        for p in table.parameters
+        if p.law is not None
+    }
+
+
+def _cost(table: CommonTable, measured: Sequence[str], inputs: Sequence[str]) -> CostSpec:
+    cost = table.cost
+    for name in cost.channels:
+        if name in inputs:
+            raise ScenarioError(f"cost.channels.{name} is an input of the FMU; compare outputs only.")
+        if name not in measured:
+            raise ScenarioError(
+                f"cost.channels.{name} has no recorded column; add [recordings.columns.{name}] or remove it."
+                f"{did_you_mean(name, measured)}"
+            )
+    channels = {
+        name: Channel(c.weight, None if isinstance(c.noise, str) else float(c.noise))
+        for name, c in cost.channels.items()
+    } or {name: Channel() for name in measured}
+    if isinstance(table, IdentifyTable) and not channels:
+        raise ScenarioError("recordings.columns names inputs only; add a measured output to compare with.")
+    mask = tuple((pair[0], pair[1]) for pair in cost.mask)
+    return CostSpec(cost.error, channels, cost.window.start, cost.window.stop, mask, tuple(cost.also))
+
+
+def _search(table: CommonTable, space: ParameterSpace) -> SearchSpec:
+    if not isinstance(table, IdentifyTable):
+        return SearchSpec()
+    for name in table.search.profile:
+        if name not in space.names:
+            raise ScenarioError(
+                f"search.profile names {name!r}, which is no parameter of [[parameters]]."
+                f"{did_you_mean(name, space.names)}"
+            )
+    values = table.search.model_dump()
+    return SearchSpec(**{**values, "profile": tuple(values["profile"])})
+
+
+def _simulation(table: CommonTable) -> SimulationSpec:
+    values = table.simulation.model_dump()
+    return SimulationSpec(memory_mb=values.pop("memory"), **values)

@@ -1,0 +1,160 @@
+"""What a scenario is once it is read: frozen objects with every file loaded and every unit the FMU's."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+from thsa_cosim.errors import ScenarioError
+from thsa_cosim.fmu import FmuDescription
+from thsa_cosim.parameters import ParameterSpace
+from thsa_cosim.recordings import Recording
+from thsa_cosim.search.strategies import Strategy
+from thsa_cosim.signals import Signals
+
+
+@dataclass(frozen=True)
+class LawSpec:
+    """The law over temperature that is wanted for a parameter; ``form`` None: the best by AICc.
+
+    ``published`` are coefficients of ``published_form`` to compare with, in the parameter's unit.
+    """
+
+    form: str | None = None
+    published: tuple[float, ...] | None = None
+    published_form: str | None = None
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A compared output; ``noise`` in its FMU unit, None: each recording's own estimate."""
+
+    weight: float = 1.0
+    noise: float | None = None
+
+
+@dataclass(frozen=True)
+class CostSpec:
+    """Eq. 6: which channels are compared, how, and when (s after the first sample)."""
+
+    error: Literal["squared", "absolute", "huber"] = "squared"
+    channels: Mapping[str, Channel] = field(default_factory=dict)
+    start: float | None = None
+    stop: float | None = None
+    mask: tuple[tuple[float, float], ...] = ()
+    also: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class SearchSpec:
+    """Differential evolution and what follows it; ``profile`` names parameters for a profile likelihood."""
+
+    population: int = 45
+    generations: int = 30
+    mutation: float = 0.16
+    crossover: float = 0.5
+    strategy: Strategy = "rand1bin"
+    tolerance: float = 1e-3
+    polish: bool = True
+    profile: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class SimulationSpec:
+    """How the FMU is run: communication ``step`` [s] (None: the samples), ``deadline`` [s], ``memory_mb``."""
+
+    interface: Literal["co-simulation", "model-exchange"] | None = None
+    tolerance: float | None = None
+    step: float | None = None
+    deadline: float = 60.0
+    memory_mb: float | None = None
+    reuse: Literal["fresh", "reset"] = "fresh"
+
+
+@dataclass(frozen=True, eq=False)
+class TemperaturePoint:
+    """Recordings that are identified together, with one set of parameters.
+
+    ``temperature_degC`` is their rounded mean, None for a joint fit over all temperatures. ``fixed`` are FMU
+    start values (FMU units) of every run; ``space`` what is searched.
+    """
+
+    temperature_degC: float | None
+    fit: tuple[Recording, ...]
+    validate: tuple[Recording, ...]
+    fixed: Mapping[str, float]
+    space: ParameterSpace
+
+    @property
+    def label(self) -> str:
+        """Short name, such as ``-30.0 degC`` or ``all``."""
+        return "all" if self.temperature_degC is None else f"{self.temperature_degC:.6g} degC"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One scenario of several that run in order; ``give`` None hands on every result."""
+
+    scenario: Path
+    give: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """What to run and what to compare it with.
+
+    ``points`` groups the fit recordings (and the validate recordings of the same temperature); ``validate``
+    holds every recording that no fit may touch. ``inputs`` drive the FMU, ``measured`` are the outputs that the
+    recordings hold, ``outputs`` those to be simulated. ``fixed`` are FMU start values (FMU units).
+    """
+
+    kind: str
+    path: Path
+    title: str
+    seed: int
+    fmu: FmuDescription
+    fit: tuple[Recording, ...]
+    validate: tuple[Recording, ...]
+    points: tuple[TemperaturePoint, ...]
+    inputs: tuple[str, ...]
+    measured: tuple[str, ...]
+    outputs: tuple[str, ...]
+    fixed: Mapping[str, float]
+    parameters: ParameterSpace
+    laws: Mapping[str, LawSpec]
+    cost: CostSpec
+    search: SearchSpec
+    simulation: SimulationSpec
+    round_to: float = 1.0
+
+    def drive(self, recording: Recording) -> Signals:
+        """Return the FMU's inputs of a recording."""
+        return recording.signals.select(self.inputs)
+
+    def noise(self, recording: Recording, channel: str) -> float:
+        """Return a channel's noise (FMU unit, above 0): the scenario's, else the recording's own estimate."""
+        spec = self.cost.channels.get(channel)
+        noise = spec.noise if spec is not None and spec.noise is not None else recording.noise[channel]
+        if not noise > 0 or not math.isfinite(noise):
+            raise ScenarioError(
+                f"{self.path}: no noise can be seen on {channel!r} in {recording.path};"
+                f" give it as cost.channels.{channel}.noise."
+            )
+        return noise
+
+    def given(self, by_temperature: Mapping[float | None, Mapping[str, float]]) -> "Scenario":
+        """Return the scenario with further FMU start values per temperature point (what an earlier stage found).
+
+        A variable that is searched for stays searched for.
+        """
+        points = tuple(
+            replace(p, fixed={**p.fixed, **_without(by_temperature.get(p.temperature_degC, {}), p.space)})
+            for p in self.points
+        )
+        return replace(self, points=points)
+
+
+def _without(values: Mapping[str, float], space: ParameterSpace) -> dict[str, float]:
+    searched = {p.variable for p in space.parameters}
+    return {name: value for name, value in values.items() if name not in searched}

@@ -7,6 +7,7 @@ import time
 import weakref
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
@@ -207,7 +208,9 @@ class LocalRunner:
         worker.is_leaving |= done.leaves
         outcome = done.outcome
         if worker.console_head:
-            outcome = _with_console(outcome, worker.console_head + outcome.console)
+            outcome = replace(
+                outcome, console=(worker.console_head + outcome.console)[: worker.console_limit]
+            )
             worker.console_head = ""
         batch.finish(batch.index.pop(done.serial), outcome)
         tired = worker.runs >= self._recycle_runs or done.rss - worker.idle_rss >= self._recycle_growth
@@ -288,12 +291,6 @@ class _Batch:
 
     def result(self) -> list[Outcome]:
         return [outcome for outcome in self._outcomes if outcome is not None]
-
-
-def _with_console(outcome: Outcome, console: str) -> Outcome:
-    return Outcome(
-        outcome.status, outcome.reason, outcome.signals, outcome.reduced, outcome.duration_s, console
-    )
 
 
 def _shut_down(workers: list[WorkerProcess], study: Study) -> None:

@@ -95,6 +95,8 @@ class FmuDescription:
     model_exchange_identifier: str | None = None
     states: int = 0
     event_indicators: int = 0
+    state_references: tuple[tuple[int, int], ...] = ()
+    """(state, its derivative) as value references, in the order of the state vector; empty if unknown."""
 
     @property
     def inputs(self) -> tuple[Variable, ...]:
@@ -171,7 +173,19 @@ def read_description(path: Path | str) -> FmuDescription:
         model_exchange_identifier=getattr(model_exchange, "modelIdentifier", None),
         states=len(raw.derivatives) or int(raw.numberOfContinuousStates or 0),
         event_indicators=len(raw.eventIndicators) or int(raw.numberOfEventIndicators or 0),
+        state_references=_state_references(raw),
     )
+
+
+def _state_references(raw: Any) -> tuple[tuple[int, int], ...]:
+    pairs = []
+    for unknown in raw.derivatives:
+        state = getattr(unknown.variable, "derivative", None)
+        if state is None:
+            return ()
+        reference = getattr(state, "valueReference", state)
+        pairs.append((int(reference), int(unknown.variable.valueReference)))
+    return tuple(pairs)
 
 
 def _capabilities(interface: Any) -> dict[str, bool | int]:

@@ -5,9 +5,11 @@ from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thsa_cosim.fmu.instance import EventInfo, Instance
 from thsa_cosim.fmu.native import Messages
+from thsa_cosim.signals import FloatArray
 
 _Logger = ctypes.CFUNCTYPE(
     None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p
@@ -115,6 +117,22 @@ class Fmi2Instance(Instance):
             (ctypes.c_void_p, ctypes.addressof(terminate)),
         )
         return bool(event.value), bool(terminate.value)
+
+    def directional_derivative(
+        self, unknowns: NDArray[np.uint32], known: NDArray[np.uint32], out: FloatArray
+    ) -> None:
+        """fmi2GetDirectionalDerivative with seed 1."""
+        pointer, size, seed = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double(1.0)
+        rows, columns = np.ascontiguousarray(unknowns), np.ascontiguousarray(known)
+        self.call(
+            "GetDirectionalDerivative",
+            (pointer, rows.ctypes.data),
+            (size, len(rows)),
+            (pointer, columns.ctypes.data),
+            (size, len(columns)),
+            (pointer, ctypes.addressof(seed)),
+            (pointer, out.ctypes.data),
+        )
 
     def asked_to_stop(self) -> tuple[bool, float | None]:
         """After fmi2Discard: whether the FMU wants to end, and the last time it reached (clause 4.2.3)."""

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thsa_cosim.fmu.instance import EventInfo, Instance
+from thsa_cosim.signals import FloatArray
 
 _Log = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
 
@@ -134,3 +136,21 @@ class Fmi3Instance(Instance):
             (ctypes.c_void_p, ctypes.addressof(terminate)),
         )
         return event.value, terminate.value
+
+    def directional_derivative(
+        self, unknowns: NDArray[np.uint32], known: NDArray[np.uint32], out: FloatArray
+    ) -> None:
+        """fmi3GetDirectionalDerivative with seed 1."""
+        pointer, size, seed = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double(1.0)
+        rows, columns = np.ascontiguousarray(unknowns), np.ascontiguousarray(known)
+        self.call(
+            "GetDirectionalDerivative",
+            (pointer, rows.ctypes.data),
+            (size, len(rows)),
+            (pointer, columns.ctypes.data),
+            (size, len(columns)),
+            (pointer, ctypes.addressof(seed)),
+            (size, 1),
+            (pointer, out.ctypes.data),
+            (size, len(out)),
+        )

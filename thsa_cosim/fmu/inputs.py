@@ -1,7 +1,8 @@
 """From sampled inputs to what an FMU is given at every communication point.
 
-Inputs are piecewise linear between the samples of a recording and constant outside of it. Between two
-communication points t_k and t_k+1 the FMU is given, best first:
+Inputs are piecewise linear between the samples of a recording, or hold from sample to sample where
+``Signals.held`` names them, and are constant outside of the recording. Between two communication points
+t_k and t_k+1 the FMU is given, for linear inputs, best first:
 
 ``derivative``
     FMI 2.0 with ``canInterpolateInputs``: u(t_k) and the slope (u(t_k+1) - u(t_k)) / h by
@@ -11,10 +12,10 @@ communication points t_k and t_k+1 the FMU is given, best first:
     Exact likewise.
 ``mean``
     Otherwise: the mean (u(t_k) + u(t_k+1)) / 2, held over the step, so that the states see the input
-    without delay (second order in h; holding u(t_k) would delay by h/2). Before the outputs at t_k+1
-    are read, the input is set to u(t_k+1), which keeps direct feed-through exact.
+    without delay (second order in h; holding u(t_k) would delay by h/2).
 
-Integer, Boolean and discrete inputs hold u(t_k) over the step, rounded to the nearest integer.
+Held, discrete, Integer and Boolean inputs keep u(t_k) over the step. Outputs at t_k are always read with
+u(t_k) applied, so that row k of the result belongs to row k of the input also under direct feed-through.
 """
 
 from collections.abc import Sequence
@@ -73,31 +74,33 @@ def input_variables(description: FmuDescription, inputs: Signals | None) -> list
     return variables
 
 
+def is_linear(inputs: Signals | None, variable: Variable) -> bool:
+    """Tell whether an input runs linearly between samples (and does not hold)."""
+    held = inputs is not None and variable.name in inputs.held
+    return variable.is_float and variable.variability == "continuous" and not held
+
+
 def sampled(inputs: Signals | None, variables: Sequence[Variable], times: FloatArray) -> FloatArray:
-    """Return the inputs at ``times``: (n, inputs); linear for continuous Reals, held for all others."""
+    """Return the inputs at ``times``: (n, inputs); linear or held, whole numbers for what is no float."""
     table = np.empty((len(times), len(variables)))
+    if inputs is None or not variables:
+        return table
+    held = frozenset(v.name for v in variables if not is_linear(inputs, v))
+    at_times = Signals(inputs.time, inputs.values, inputs.units, held).resample(times)
     for column, variable in enumerate(variables):
-        assert inputs is not None
-        values = inputs[variable.name]
-        if variable.is_float and variable.variability == "continuous":
-            table[:, column] = np.interp(times, inputs.time, values)
-        else:
-            index = np.clip(np.searchsorted(inputs.time, times, side="right") - 1, 0, len(values) - 1)
-            held = values[index]
-            table[:, column] = held if variable.is_float else np.rint(held)
+        values = at_times[variable.name]
+        table[:, column] = values if variable.is_float else np.rint(values)
     return table
 
 
-def input_mode(description: FmuDescription, variables: Sequence[Variable]) -> str:
-    """Return "derivative", "intermediate" or "mean": how continuous inputs are given (see the module)."""
-    continuous = [v for v in variables if v.is_float and v.variability == "continuous"]
+def input_mode(description: FmuDescription, linear: Sequence[Variable]) -> str:
+    """Return "derivative", "intermediate" or "mean": how linear inputs are given (see the module)."""
     if description.fmi_version == "2.0" and description.capabilities.get("canInterpolateInputs"):
         return "derivative"
     if (
         description.fmi_version == "3.0"
         and description.capabilities.get("providesIntermediateUpdate")
-        and continuous
-        and all(v.intermediate_update and v.type == "Float64" for v in continuous)
+        and all(v.intermediate_update and v.type == "Float64" for v in linear)
     ):
         return "intermediate"
     return "mean"

@@ -104,6 +104,12 @@ class Instance(ABC):
     def access(self, function: Any, references: int, count: int, values: int) -> int:
         """Call a function from ``value_function`` on addresses; return its status code."""
 
+    @abstractmethod
+    def directional_derivative(
+        self, unknowns: NDArray[np.uint32], known: NDArray[np.uint32], out: FloatArray
+    ) -> None:
+        """Write d(unknowns)/d(known) (n,) into ``out`` for one known variable."""
+
     # -- what they do alike -------------------------------------------------------------------------
     def call(self, name: str, *arguments: tuple[Any, Any], time: float | None = None) -> None:
         """Call ``<prefix><name>(instance, ...)`` with (ctype, value) pairs and check its status."""

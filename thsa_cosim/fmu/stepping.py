@@ -16,7 +16,7 @@ from thsa_cosim.errors import ParameterError
 from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.fmi2 import Fmi2Instance
 from thsa_cosim.fmu.fmi3 import Fmi3Instance
-from thsa_cosim.fmu.inputs import communication_grid, input_mode, input_variables, sampled
+from thsa_cosim.fmu.inputs import communication_grid, input_mode, input_variables, is_linear, sampled
 from thsa_cosim.fmu.instance import Channel, Instance, Phase
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -127,27 +127,21 @@ class Plan:
         output_variables = [description.variable(name) for name in outputs]
         self.output_channels = instance.channels(output_variables)
         self.units = {v.name: v.unit or "1" for v in output_variables}
-        self.mode = input_mode(description, variables)
+        linear = np.array([is_linear(inputs, v) for v in variables], dtype=bool)
+        self.mode = input_mode(description, [v for v, yes in zip(variables, linear, strict=True) if yes])
         table = sampled(inputs, variables, self.grid.times)
         self.first = table[0] if variables else np.empty(0)
-        continuous = np.array([v.is_float and v.variability == "continuous" for v in variables], dtype=bool)
-        moves = bool(continuous.any()) and bool((table[1:] != table[:-1])[:, continuous].any())
-        self.begin = self._rows(self._at_begin(table, continuous))
-        self.end = self._rows(self._at_end(table, continuous)) if self.mode != "derivative" and moves else []
-        self.smooth = self._smooth_channel(table, continuous) if moves and self.mode != "mean" else None
-
-    def _at_begin(self, table: FloatArray, continuous: NDArray[np.bool_]) -> FloatArray:
-        if self.mode != "mean":
-            return table
-        mean = table.copy()
-        mean[:-1, continuous] = 0.5 * (table[:-1, continuous] + table[1:, continuous])
-        return mean
-
-    @staticmethod
-    def _at_end(table: FloatArray, continuous: NDArray[np.bool_]) -> FloatArray:
-        end = table.copy()
-        end[1:, ~continuous] = table[:-1, ~continuous]
-        return end
+        moves = (table != table[0]).any(axis=0)
+        begin = table.copy()
+        if self.mode == "mean":
+            begin[:-1, linear] = 0.5 * (table[:-1, linear] + table[1:, linear])
+        self.begin = self._rows(begin)
+        # With slopes given, linear inputs have arrived at u(t_k+1) by themselves.
+        arrives = linear if self.mode == "derivative" else np.zeros_like(linear)
+        self.end = self._rows(table) if (moves & ~arrives).any() else []
+        uses_slopes = self.mode != "mean" and (moves & linear).any()
+        self.smooth = self._smooth_channel(table, linear) if uses_slopes else None
+        self.inputs, self.input_variables, self.linear = inputs, variables, linear
 
     def _rows(self, table: FloatArray) -> list[tuple[Channel, NDArray[Any]]]:
         """One contiguous (n, variables) table per data type."""
@@ -157,13 +151,13 @@ class Plan:
         ]
 
     def _smooth_channel(
-        self, table: FloatArray, continuous: NDArray[np.bool_]
+        self, table: FloatArray, linear: NDArray[np.bool_]
     ) -> tuple[Channel, FloatArray, FloatArray, NDArray[np.int32]] | None:
-        """Continuous double inputs: channel, values (n, m), slopes (n-1, m), derivative orders (m,)."""
+        """Linear double inputs: channel, values (n, m), slopes (n-1, m), derivative orders (m,)."""
         for channel in self.input_channels:
             if channel.suffix not in ("Real", "Float64"):
                 continue
-            inside = [i for i, c in enumerate(channel.columns) if continuous[c]]
+            inside = [i for i, c in enumerate(channel.columns) if linear[c]]
             columns = [channel.columns[i] for i in inside]
             values = np.ascontiguousarray(table[:, columns])
             slopes = np.ascontiguousarray(np.diff(values, axis=0) / self.grid.steps[:, None])

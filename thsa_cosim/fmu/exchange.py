@@ -1,0 +1,283 @@
+"""Model Exchange: our own integration of an FMU's right-hand side, with all of its events.
+
+Inputs are applied as u(t) at every call of the right-hand side, so results do not depend on the output
+times. Integration stops at every kink of a linear input (no pulse is stepped over) and restarts, through
+Event Mode, wherever an input jumps. State events are located by CVODE's root finding, and the signs of the
+event indicators are compared after every step as well (an indicator that returns from exactly zero has no
+root); time and step events follow FMI 2.0.4 clause 3.2 and FMI 3.0.2 clause 3.2.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from thsa_cosim.fmu.cvode import Cvode
+from thsa_cosim.fmu.failure import SimulationFailure, Status
+from thsa_cosim.fmu.inputs import sampled
+from thsa_cosim.fmu.instance import Instance, Phase
+from thsa_cosim.fmu.stepping import Plan
+from thsa_cosim.signals import FloatArray, Signals
+
+_SAFETY = 0.1
+"""Local errors are held this much below the tolerance, so that global errors come out near it."""
+_EVENTS_AT_ONE_TIME = 200
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of time over which every input is linear: u(t) = value + slope (t - start)."""
+
+    start: float
+    stop: float
+    value: FloatArray
+    slope: FloatArray
+    jumps: bool
+    """Whether some input jumps at ``start``."""
+
+
+def segments(plan: Plan) -> list[Segment]:
+    """Return the linear stretches of the inputs between the first and the last output time."""
+    t0, t1 = float(plan.grid.times[0]), float(plan.grid.times[-1])
+    inputs = plan.inputs
+    if inputs is None or not plan.input_variables:
+        return [Segment(t0, t1, np.empty(0), np.empty(0), False)]
+    slack = _slack(plan)
+    knots = inputs.time[(inputs.time > t0 + slack) & (inputs.time < t1 - slack)]
+    times = np.concatenate(([t0], knots, [t1])) if t1 > t0 else np.array([t0, t0 + 1.0])
+    table = sampled(inputs, plan.input_variables, times)
+    linear = plan.linear
+    slopes = np.where(linear, np.diff(table, axis=0) / np.diff(times)[:, None], 0.0)
+    jumps = np.zeros(len(times) - 1, dtype=bool)
+    jumps[1:] = (table[1:-1] != table[:-2])[:, ~linear].any(axis=1)
+    scale = np.max(np.abs(slopes), axis=0, initial=0.0)
+    kinks = (np.abs(np.diff(slopes, axis=0)) > 1e-9 * scale).any(axis=1)
+    starts = [0, *(np.flatnonzero(kinks | jumps[1:]) + 1).tolist()]
+    result = []
+    for a, b in zip(starts, [*starts[1:], len(times) - 1], strict=True):
+        slope = np.where(linear, (table[b] - table[a]) / (times[b] - times[a]), 0.0)
+        result.append(Segment(float(times[a]), float(times[b]), table[a], slope, bool(jumps[a])))
+    return result
+
+
+def _slack(plan: Plan) -> float:
+    """Times closer than this are one time [s]."""
+    steps = plan.grid.steps
+    return 1e-6 * float(steps.min()) if len(steps) else 1e-12
+
+
+class _Run:
+    """One integration from the first to the last output time."""
+
+    def __init__(self, instance: Instance, plan: Plan, progress: FloatArray, tolerance: float | None) -> None:
+        self.instance, self.plan, self.progress = instance, plan, progress
+        description = instance.description
+        self.rtol = _SAFETY * (tolerance or description.default_experiment.tolerance or 1e-6)
+        self.nx, self.nz = description.states, description.event_indicators
+        self.segment = Segment(0.0, 0.0, np.empty(0), np.empty(0), False)
+        self.rows = np.full((len(plan.grid.times), len(plan.outputs)), np.nan)
+        self.next_row = 0
+        self.next_event: float | None = None
+        self.ends = False
+        prefix = {"fmi2": "GetDerivatives", "fmi3": "GetContinuousStateDerivatives"}
+        self._derivatives = prefix[instance.prefix]
+
+    # -- the FMU at one point -------------------------------------------------------------------------
+    def place(self, time: float, states: FloatArray) -> None:
+        """Give the FMU a time, states and the inputs there."""
+        instance = self.instance
+        self.progress[1] = time
+        instance.set_time(time)
+        if self.nx:
+            instance.vector("SetContinuousStates", np.ascontiguousarray(states[: self.nx]))
+        if self.plan.input_channels:
+            self.apply_inputs(time, only_linear=True)
+
+    def apply_inputs(self, time: float, *, only_linear: bool) -> None:
+        """Set u(time); outside of Event Mode only continuous inputs may change."""
+        segment = self.segment
+        values = segment.value + segment.slope * (time - segment.start)
+        channels = self.plan.input_channels
+        if only_linear:
+            channels = [c for c in channels if c.dtype.kind == "f"]
+        self.instance.set_values(channels, values)
+
+    def rhs(self, time: float, states: FloatArray, out: FloatArray) -> None:
+        """dx/dt for CVODE."""
+        self.place(time, states)
+        if not self.nx:
+            out[:] = 0.0
+            return
+        self.instance.vector(self._derivatives, out)
+        if not np.isfinite(out).all():
+            i = int(np.argmin(np.isfinite(out)))
+            reason = f"the derivative of state {i + 1} became {out[i]} at t = {time:.9g} s"
+            raise SimulationFailure(Status.NOT_FINITE, reason)
+
+    def roots(self, time: float, states: FloatArray, out: FloatArray) -> None:
+        """Event indicators for CVODE."""
+        self.place(time, states)
+        self.instance.vector("GetEventIndicators", out)
+
+    def signs(self) -> FloatArray:
+        """Signs of the event indicators at the present point."""
+        z = np.zeros(self.nz)
+        if self.nz:
+            self.instance.vector("GetEventIndicators", z)
+        return np.asarray(z > 0.0, dtype=np.float64)
+
+    def record(self, time: float, states: FloatArray) -> None:
+        """Read the outputs as the next row."""
+        self.place(time, states)
+        row = self.rows[self.next_row]
+        self.instance.get_values(self.plan.output_channels, row)
+        if not np.isfinite(row).all():
+            i = int(np.argmin(np.isfinite(row)))
+            reason = f"{self.plan.outputs[i]} became {row[i]} at t = {time:.9g} s"
+            raise SimulationFailure(Status.NOT_FINITE, reason)
+        self.next_row += 1
+
+    def states(self) -> FloatArray:
+        """Present continuous states; one that stands still if the FMU has none."""
+        x = np.ones(max(self.nx, 1))
+        if self.nx:
+            self.instance.vector("GetContinuousStates", x)
+        return x
+
+    def absolute_tolerance(self) -> FloatArray:
+        """rtol times the nominal values of the states, as the FMI suggests (FMI 2.0.4 clause 2.2.7)."""
+        nominal = np.ones(max(self.nx, 1))
+        if self.nx:
+            self.instance.vector("GetNominalsOfContinuousStates", nominal)
+        usable = np.isfinite(nominal) & (nominal != 0.0)
+        return self.rtol * np.where(usable, np.abs(nominal), 1.0)
+
+    # -- events ---------------------------------------------------------------------------------------
+    def iterate_events(self) -> None:
+        """Event iteration in Event Mode, then on to Continuous-Time Mode."""
+        for _ in range(_EVENTS_AT_ONE_TIME):
+            info = self.instance.event_iteration()
+            self.ends |= info.terminate
+            self.next_event = info.next_event_time
+            if self.ends or not info.needs_update:
+                break
+        else:
+            raise SimulationFailure(Status.FMI_ERROR, "the event iteration does not come to an end")
+        self.instance.enter_continuous_time_mode()
+
+    def event(self, time: float, solver: Cvode) -> None:
+        """Handle an event at the present point and restart the solver."""
+        self.instance.enter_event_mode()
+        if self.plan.input_channels:
+            self.apply_inputs(time, only_linear=False)
+        self.iterate_events()
+        solver.restart(time, self.states(), self.absolute_tolerance())
+
+    # -- the loop -------------------------------------------------------------------------------------
+    def integrate(self) -> None:
+        times = self.plan.grid.times
+        slack = _slack(self.plan)
+        stretches: Iterator[Segment] = iter(segments(self.plan))
+        self.segment = next(stretches)
+        instance, t1, t = self.instance, float(times[-1]), float(times[0])
+        instance.initialize_begin(t, t1, self.rtol)
+        if self.plan.input_channels:
+            self.apply_inputs(t, only_linear=False)
+        instance.initialize_end()
+        self.iterate_events()
+        self.progress[0] = Phase.STEP
+        solver = Cvode(
+            t,
+            self.states(),
+            self.rhs,
+            rtol=self.rtol,
+            atol=self.absolute_tolerance(),
+            roots=self.roots,
+            root_count=self.nz,
+            jacobian=self.jacobian if self._has_jacobian() else None,
+        )
+        try:
+            self.record(t, solver.states)
+            signs = self.signs()
+            here = 0
+            while t < t1 - slack and not self.ends:
+                stop = min(self.segment.stop, t1)
+                if self.next_event is not None:
+                    stop = min(stop, max(self.next_event, t))
+                if not self.nx:
+                    stop = min(stop, float(times[self.next_row]))
+                before = t
+                if stop - t > slack * 1e-3:
+                    t, is_root = solver.step(stop)
+                else:
+                    t, is_root = stop, False
+                while self.next_row < len(times) and times[self.next_row] < t - slack:
+                    self.record(float(times[self.next_row]), solver.at(float(times[self.next_row])))
+                self.place(t, solver.states)
+                step_event, terminate = self._completed()
+                self.ends |= terminate
+                is_time_event = self.next_event is not None and t >= self.next_event - 1e-3 * slack
+                is_jump = self._advance_segment(t, slack, stretches)
+                is_state_event = is_root or bool((self.signs() != signs).any())
+                if step_event or is_time_event or is_jump or is_state_event:
+                    here = here + 1 if t - before <= slack * 1e-3 else 0
+                    if here > _EVENTS_AT_ONE_TIME:
+                        reason = f"events follow each other without end at t = {t:.9g} s"
+                        raise SimulationFailure(Status.FMI_ERROR, reason)
+                    self.event(t, solver)
+                    self.place(t, solver.states)
+                    signs = self.signs()
+                while self.next_row < len(times) and times[self.next_row] <= t + slack and not self.ends:
+                    self.record(t, solver.states)
+        finally:
+            solver.close()
+        if self.next_row < len(times):
+            reason = f"the FMU ended the simulation at t = {t:.9g} s of {t1:.9g} s"
+            raise SimulationFailure(Status.INCOMPLETE, reason + instance.messages.last())
+
+    def _completed(self) -> tuple[bool, bool]:
+        if not self.instance.description.capabilities.get("needsCompletedIntegratorStep", True):
+            return False, False
+        return self.instance.completed_integrator_step()
+
+    def _advance_segment(self, time: float, slack: float, stretches: Iterator[Segment]) -> bool:
+        """Go on to the stretch of inputs that begins at ``time``; return whether an input jumps there."""
+        jumps = False
+        while time >= self.segment.stop - 1e-3 * slack:
+            following = next(stretches, None)
+            if following is None:
+                break
+            self.segment = following
+            jumps |= following.jumps
+        return jumps
+
+    # -- exact Jacobian -------------------------------------------------------------------------------
+    def _has_jacobian(self) -> bool:
+        description = self.instance.description
+        return bool(
+            self.nx
+            and description.capabilities.get("providesDirectionalDerivative")
+            and len(description.state_references) == self.nx
+        )
+
+    def jacobian(self, time: float, states: FloatArray, out: FloatArray) -> None:
+        """df/dx column by column through directional derivatives."""
+        self.place(time, states)
+        column = np.empty(self.nx)
+        references = np.array(self.instance.description.state_references, dtype=np.uint32)
+        for j in range(self.nx):
+            self.instance.directional_derivative(references[:, 1], references[j : j + 1, 0], column)
+            out[:, j] = column
+
+
+def integrate(instance: Instance, plan: Plan, progress: FloatArray, tolerance: float | None) -> Signals:
+    """Initialise and integrate an instance; SimulationFailure if it does not reach the end.
+
+    ``tolerance`` is relative; None: the FMU's default experiment, else 1e-6.
+    """
+    run = _Run(instance, plan, progress, tolerance)
+    run.integrate()
+    progress[0] = Phase.TERMINATE
+    instance.terminate()
+    values = {name: np.ascontiguousarray(run.rows[:, i]) for i, name in enumerate(plan.outputs)}
+    return Signals(plan.grid.times, values, plan.units)

@@ -183,6 +183,8 @@ class ParameterSpace:
         with np.errstate(over="ignore"):
             raw = low + u * (high - low)
             values = np.where(self._log, np.exp(np.where(self._log, raw, 0.0)), raw)
+        # exp(log(x)) is not x: the ends are the bounds themselves.
+        values = np.where(u <= 0.0, self.lower, np.where(u >= 1.0, self.upper, values))
         inside: FloatArray = np.clip(values, self.lower, self.upper)
         return inside
 

@@ -47,6 +47,8 @@ def _parse(unit: str) -> pint.Unit:
     if len(unit) > 80:
         raise UnitError(f"unit {unit[:40]!r}... is too long to be a unit.")
     try:
+        if "//" in unit:
+            raise ValueError(unit)
         return _registry().parse_units(_pint_spelling(unit))
     except Exception:  # pint raises a dozen types, AssertionError and TokenError among them
         raise UnitError(
@@ -61,7 +63,9 @@ def _speaks_of_angle(unit: pint.Unit) -> bool:
 def _check_frequency(source: str, target: str) -> None:
     """Refuse Hz against rad/s: pint takes both as 1/s, which hides a factor of 2 pi."""
     a, b = _parse(source), _parse(target)
-    if _speaks_of_angle(a) == _speaks_of_angle(b) or dict(a.dimensionality) != {"[time]": -1}:
+    if _speaks_of_angle(a) == _speaks_of_angle(b):
+        return
+    if a.dimensionality != b.dimensionality or dict(a.dimensionality) != {"[time]": -1}:
         return
     plain, name = (b, target) if _speaks_of_angle(a) else (a, source)
     if set(plain._units) != {"second"}:

@@ -151,7 +151,8 @@ def test_linear_loops_of_any_size_equal_numpy(tmp_path, size):
 
 def test_relations_become_modes_only_where_they_must(tmp_path):
     source = """model M
-      parameter Real p = 1; parameter Boolean on = true; input Real u; Real x(start=0, fixed=true); Real y; Real z; Real q;
+      parameter Real p = 1; parameter Boolean on = true; input Real u; Real x(start=0, fixed=true);
+      Real y; Real z; Real q;
       Boolean b;
     equation
       der(x) = u;
@@ -241,7 +242,7 @@ def test_nonlinear_loop_names_equation_and_variable(tmp_path):
 
 
 def test_unknown_class_is_answered_with_the_closest():
-    with pytest.raises(ModelicaError, match="Did you mean 'THSA.Actuator'"):
+    with pytest.raises(ModelicaError, match=r"Did you mean 'THSA\.Actuator'"):
         flatten("Actuatr", THSA)
 
 

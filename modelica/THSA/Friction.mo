@@ -10,9 +10,11 @@ block Friction "Friction over sliding speed: Coulomb, breakaway with Stribeck de
   parameter Real v_S(min=1e-9) = 1 "Stribeck speed";
   parameter Real n(unit="1", min=0.1, max=10) = 2 "Exponent of the Stribeck decay";
   parameter Real v_r(min=1e-12) = 1e-6 "Half width of the regularised sign";
+  Real stribeck(unit="1") "Breakaway part, relative to Coulomb friction";
 equation
   s = if v > v_r then 1 elseif v < -v_r then -1 else v/v_r;
-  F_f = (F_C*(1 + (r_b - 1)*exp(-((v^2 + v_r^2)/v_S^2)^(n/2))) + b_q*v^2)*s + b_v*v;
+  stribeck = if r_b > 1 or r_b < 1 then (r_b - 1)*exp(-((v^2 + v_r^2)/v_S^2)^(n/2)) else 0;
+  F_f = (F_C*(1 + stribeck) + b_q*v^2)*s + b_v*v;
   annotation(
     Documentation(info="<html>
 <p>Equation 5 of the article: F_f = [F_C + b_v |v| + b_q v<sup>2</sup> + (F_b &minus; F_C)

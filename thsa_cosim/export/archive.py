@@ -37,7 +37,8 @@ def make_sources(model: CausalModel, fmi: int) -> Sources:
     import fmpy
 
     name = identifier(model.flat.name)
-    files = {"model.c": model_source(model).encode()}
+    source = model_source(model)
+    files = {"model.c": source.text.encode()}
     other = "fmi3" if fmi == 2 else "fmi2"
     for path in sorted(RUNTIME.glob("*.[ch]")):
         if not path.name.startswith(other):
@@ -49,13 +50,13 @@ def make_sources(model: CausalModel, fmi: int) -> Sources:
     digest = hashlib.sha256()
     compiled = tuple(sorted(file for file in files if file.endswith(".c")))
     described = (model, name, "", "") if fmi == 3 else (model, name, "", "", compiled)
-    for text in (describe(*described), config_header(model, name, "", tolerance).encode()):
+    for text in (describe(*described), config_header(model, name, "", tolerance, source.cache).encode()):
         digest.update(text)
     for file in sorted(files):
         digest.update(file.encode() + b"\0" + files[file].replace(b"\r\n", b"\n") + b"\0")
     code = digest.hexdigest()
     token = f"{{{code[:8]}-{code[8:12]}-{code[12:16]}-{code[16:20]}-{code[20:32]}}}"
-    files["model_config.h"] = config_header(model, name, token, tolerance).encode()
+    files["model_config.h"] = config_header(model, name, token, tolerance, source.cache).encode()
     return Sources(files, compiled, code, token, name)
 
 

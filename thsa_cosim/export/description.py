@@ -12,8 +12,10 @@ from thsa_cosim.export.units import base_unit
 
 LOG_CATEGORIES = {
     "logAll": "All messages",
-    "logStatusError": "Errors: forbidden calls, wrong arguments, failed computations",
     "logStatusWarning": "Warnings",
+    "logStatusDiscard": "Steps that the solver could not finish",
+    "logStatusError": "Forbidden calls and wrong arguments",
+    "logStatusFatal": "Failures that end the instance",
     "logEvents": "State events and event iterations",
     "logSolver": "Steps of the Co-Simulation solver",
 }

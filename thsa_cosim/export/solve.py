@@ -137,8 +137,8 @@ class EquationSystem:
                 result += ca.jacobian(residual, symbol) * self.derivative(name)
             elif name in self.inputs:
                 raise ModelicaError(
-                    f"{model}: the equation {self.labels[row]} constrains states with the input {name}, whose derivative "
-                    "would be needed (higher index); put a stiffness or a filter between them."
+                    f"{model}: the equation {self.labels[row]} constrains states with the input {name}, whose "
+                    "derivative would be needed (higher index); put a stiffness or a filter between them."
                 )
         return result
 

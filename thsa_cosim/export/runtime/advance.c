@@ -173,8 +173,8 @@ Status solver_advance(Instance *c, double end) {
         if (!(now->step > 0.0)) now->step = first_step(c, remaining);
         h = 1.1 * now->step >= remaining ? remaining : now->step > 0.5 * remaining ? 0.5 * remaining : now->step;
         if (rapid > MOST_RAPID) {
-            blind = blind > 0.0 ? 8.0 * blind : 64.0 * grain;
-            h = fmin(h, blind);
+            blind = fmin(blind > 0.0 ? 8.0 * blind : 64.0 * grain, 1e-3 * now->step);
+            h = fmin(h, fmax(blind, grain));
         }
         for (;;) { /* attempts at one step */
             if (++attempts > MOST_STEPS) return give_up(c, "too many internal steps in one communication step");
@@ -219,7 +219,7 @@ Status solver_advance(Instance *c, double end) {
             start = finish;
             continue;
         }
-        if (now->time - last_event > 1e-6 * now->step) rapid = 0, blind = 0.0;
+        if (now->time - last_event > fmax(1e-6 * now->step, 4.0 * blind)) rapid = 0, blind = 0.0;
         last_event = now->time;
         if (++rapid == MOST_RAPID)
             instance_log(c, WARNING, LOG_WARNING, "burst of events at time %.15g is crossed blindly", now->time);

@@ -122,7 +122,7 @@ double instance_indicator(const Instance *c, int k) {
 static Status update_dependent(Instance *c) {
     State *s = &c->s;
     if (!s->dependent_due) return OK;
-    if (N_D && (model_dependent(s->p, s->d) || !all_finite(s->d, N_D)))
+    if (N_D + N_CACHE && (model_dependent(s->p, s->d) || !all_finite(s->d, N_D)))
         return fail(c, s->phase <= INITIALIZATION ? FAILED : DISCARD, "a calculated parameter cannot be computed");
     s->dependent_due = 0;
     instance_changed(c);
@@ -380,9 +380,9 @@ Status instance_do_step(Instance *c, double from, double size) {
         s->inputs_moving = 0;
         c->jacobian_valid = 0;
     }
-    s->derivatives_used = 1;
     if (instance_settle(c) != OK) return DISCARD;
     if (end > s->now.time) {
+        s->derivatives_used = 1;
         const Motion before = s->now;
         s->phase = IN_STEP;
         const Status status = solver_advance(c, end);

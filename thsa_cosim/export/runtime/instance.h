@@ -35,7 +35,7 @@ typedef struct {
 } Motion;
 
 typedef struct {
-    double p[N_P + 1], d[N_D + 1], x_start[N_X + 1];
+    double p[N_P + 1], d[N_D + N_CACHE + 1], x_start[N_X + 1];
     double du[N_U + 1];      /* input derivatives of the next communication step */
     Motion now;
     double start_time, stop_time, tolerance;

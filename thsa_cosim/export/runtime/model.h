@@ -10,6 +10,10 @@
 
 #include "model_config.h"
 
+#ifndef N_CACHE
+#define N_CACHE 0 /* doubles behind d[N_D] in which the model keeps what only slow inputs change */
+#endif
+
 #if N_X < 0 || N_U < 0 || N_P < 0 || N_D < 0 || N_W < 0 || N_Y > N_W || N_G < 0
 #error "model_config.h: inconsistent sizes"
 #endif

@@ -50,7 +50,7 @@ static const double H[3][STAGES] = {
      -59.78993625266729, -0.15582684282751913, 4.883087185713722},
 };
 
-double solver_tolerance(const Instance *c) { return 0.1 * c->s.tolerance; }
+double solver_tolerance(const Instance *c) { return c->s.tolerance; }
 
 void solver_inputs(const Instance *c, double h, double *u) {
     for (int k = 0; k < N_U; k++) u[k] = c->s.now.u[k] + h * c->s.du[k];

@@ -8,8 +8,19 @@
 """
 
 from thsa_cosim.batch.job import Experiment, Job, Reducer
+from thsa_cosim.batch.journal import Journal, JournalRow
 from thsa_cosim.batch.local import LocalRunner
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.runner import Runner
 
-__all__ = ["Experiment", "Job", "LocalRunner", "Outcome", "Reducer", "Runner", "Status"]
+__all__ = [
+    "Experiment",
+    "Job",
+    "Journal",
+    "JournalRow",
+    "LocalRunner",
+    "Outcome",
+    "Reducer",
+    "Runner",
+    "Status",
+]

@@ -1,0 +1,274 @@
+"""The same jobs on a Dask cluster (extra ``cluster``).
+
+Each Dask task runs one job in a LocalRunner of its own worker, so an FMU that crashes or hangs costs a
+process there, not the Dask worker. The study (experiments and FMU archives) goes to every Dask worker once,
+named by its digest; a worker that joins later gets it from another one. A lost worker's jobs are run again
+elsewhere, by Dask; each job has exactly one outcome.
+"""
+
+import contextlib
+import hashlib
+import pickle
+import threading
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Any, Self
+
+from thsa_cosim.batch.job import Experiment, Job
+from thsa_cosim.batch.local import LocalRunner
+from thsa_cosim.batch.outcome import Outcome, Status
+from thsa_cosim.batch.runner import OnOutcome, check_experiment, check_jobs
+from thsa_cosim.errors import FmuError, MissingExtraError, StudyError
+from thsa_cosim.fmu.description import FmuDescription, read_description
+
+_CONNECT_S = 20.0
+_ATTEMPTS = 3
+"""How often the study is sent anew because all workers that held it were lost."""
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """A study as it travels."""
+
+    digest: str
+    experiments: tuple[Experiment, ...]
+    archives: dict[str, bytes]
+    """File name, as in the experiments' ``fmu``, -> content of the archive."""
+    options: dict[str, Any]
+    """Keyword arguments of LocalRunner."""
+
+
+class ClusterRunner:
+    """Runs batches on the Dask cluster at ``address``; see ``Runner``."""
+
+    def __init__(
+        self,
+        experiments: Sequence[Experiment],
+        address: str,
+        *,
+        timeout_s: float = _CONNECT_S,
+        **options: Any,
+    ) -> None:
+        """Connect to the scheduler and send the study to all of its workers.
+
+        Parameters
+        ----------
+        address
+            Of the scheduler, e.g. "tcp://host:8786".
+        timeout_s
+            How long to wait for the scheduler, s.
+        options
+            As for LocalRunner (``deadline_s``, ``memory_limit_mb``, ...), but ``workers``: every thread of
+            every Dask worker runs one job at a time.
+
+        Raises
+        ------
+        MissingExtraError
+            If dask.distributed is not installed.
+        StudyError
+            If the scheduler does not answer or has no workers.
+        """
+        try:
+            import distributed
+        except ImportError:
+            raise MissingExtraError("Running on a cluster", "cluster") from None
+        self._distributed = distributed
+        self._descriptions, self._failures = _describe(experiments)
+        self._parcel = _pack(experiments, options)
+        try:
+            self._client = distributed.Client(address, timeout=timeout_s, set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            reason = " ".join(str(error).split()).rstrip(".")
+            raise StudyError(f"No Dask scheduler answers at {address} ({reason}).") from None
+        try:
+            if not self._client.scheduler_info()["workers"]:
+                self._client.wait_for_workers(1, timeout=timeout_s)
+            self._send()
+        except TimeoutError:
+            self._client.close()
+            raise StudyError(f"The Dask scheduler at {address} has no workers; start some.") from None
+        except BaseException:
+            self._client.close()
+            raise
+
+    def _send(self) -> None:
+        # hash=False: a future of its own name, so that nothing else's loss can touch it.
+        self._shipped = self._client.scatter(self._parcel, broadcast=True, hash=False)
+
+    def run(self, jobs: Sequence[Job], on_outcome: OnOutcome | None = None) -> list[Outcome]:
+        """Run all jobs; see ``Runner.run``."""
+        jobs = list(jobs)
+        check_jobs(jobs, self._descriptions)
+        outcomes: list[Outcome | None] = [None] * len(jobs)
+
+        def finish(index: int, outcome: Outcome) -> None:
+            outcomes[index] = outcome
+            if on_outcome is not None:
+                on_outcome(index, outcome)
+
+        waiting = []
+        for index, job in enumerate(jobs):
+            failure = self._failures.get(job.experiment)
+            if failure is None:
+                waiting.append(index)
+            else:
+                finish(index, failure)
+        for attempt in range(_ATTEMPTS):
+            if attempt:
+                self._client.wait_for_workers(1, timeout=_CONNECT_S)
+                self._send()
+            waiting = self._round(jobs, waiting, finish)
+            if not waiting:
+                break
+        for index in waiting:
+            finish(index, Outcome(Status.CRASH, "the cluster lost the workers of this job again and again"))
+        return [outcome for outcome in outcomes if outcome is not None]
+
+    def _round(self, jobs: Sequence[Job], indexes: Sequence[int], finish: Any) -> list[int]:
+        """Submit jobs and collect outcomes; return the jobs whose study got lost with its workers."""
+        run = uuid.uuid4().hex
+        futures = [
+            self._client.submit(run_job, self._shipped, jobs[i], key=f"thsa-{run}-{i}", pure=False)
+            for i in indexes
+        ]
+        index_of = {future.key: i for future, i in zip(futures, indexes, strict=True)}
+        lost = []
+        try:
+            done = self._distributed.as_completed(futures, with_results=True, raise_errors=False)
+            for future, result in done:
+                index = index_of[future.key]
+                if future.status == "finished":
+                    finish(index, result)
+                elif future.status in ("cancelled", "lost"):
+                    lost.append(index)
+                else:
+                    finish(index, _task_failure(result))
+        except BaseException:
+            with contextlib.suppress(Exception):
+                self._client.cancel(futures, force=True)
+            raise
+        return sorted(lost)
+
+    def close(self) -> None:
+        """Have the workers drop the study, and disconnect."""
+        with contextlib.suppress(Exception):
+            self._client.run(close_study, self._parcel.digest)
+        with contextlib.suppress(Exception):
+            self._client.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _describe(
+    experiments: Sequence[Experiment],
+) -> tuple[dict[str, FmuDescription | None], dict[str, Outcome]]:
+    descriptions: dict[str, FmuDescription | None] = {}
+    failures: dict[str, Outcome] = {}
+    read: dict[Path, FmuDescription] = {}
+    for experiment in experiments:
+        try:
+            if experiment.fmu not in read:
+                read[experiment.fmu] = read_description(experiment.fmu)
+        except FmuError as error:
+            descriptions[experiment.name] = None
+            failures[experiment.name] = Outcome(Status.BAD_ARCHIVE, str(error).rstrip("."))
+            continue
+        check_experiment(experiment, read[experiment.fmu])
+        descriptions[experiment.name] = read[experiment.fmu]
+    return descriptions, failures
+
+
+def _pack(experiments: Sequence[Experiment], options: dict[str, Any]) -> Parcel:
+    archives: dict[str, bytes] = {}
+    travelling = []
+    for experiment in experiments:
+        path = Path(experiment.fmu)
+        name = path.name
+        if path.is_file():
+            content = path.read_bytes()
+            name = f"{hashlib.sha256(content).hexdigest()[:16]}-{path.name}"
+            archives[name] = content
+        travelling.append(replace(experiment, fmu=Path(name)))
+    digest = hashlib.sha256(pickle.dumps((travelling, sorted(archives), options)))
+    return Parcel(digest.hexdigest(), tuple(travelling), archives, options)
+
+
+def _task_failure(result: Any) -> Outcome:
+    """Outcome of a task that Dask gave up: a worker died under it several times, or it raised."""
+    error = result[1] if isinstance(result, tuple) else result
+    text = " ".join(f"{type(error).__name__}: {error}".split())[:500]
+    if type(error).__name__ == "KilledWorker":
+        return Outcome(Status.CRASH, "the cluster lost every worker that tried this job")
+    return Outcome(Status.LOAD_ERROR, f"the cluster's worker raised {text}")
+
+
+# -- on the Dask workers ----------------------------------------------------------------------------------
+class _Unpacked:
+    """A study on a Dask worker: one LocalRunner with one process per concurrent task."""
+
+    def __init__(self, parcel: Parcel) -> None:
+        self._parcel = parcel
+        self._folder = TemporaryDirectory(prefix="thsa-cosim-cluster-")
+        folder = Path(self._folder.name)
+        for name, content in parcel.archives.items():
+            (folder / name).write_bytes(content)
+        self._experiments = [replace(e, fmu=folder / e.fmu) for e in parcel.experiments]
+        self._idle: list[LocalRunner] = []
+        self._lock = threading.Lock()
+        self._closed = False
+
+    def run(self, job: Job) -> Outcome:
+        with self._lock:
+            runner = self._idle.pop() if self._idle else None
+        if runner is None:
+            runner = LocalRunner(self._experiments, workers=1, **self._parcel.options)
+        try:
+            (outcome,) = runner.run([job])
+        except BaseException:
+            runner.close()
+            raise
+        with self._lock:
+            if not self._closed:
+                self._idle.append(runner)
+                return outcome
+        runner.close()
+        return outcome
+
+    def close(self) -> None:
+        with self._lock:
+            self._closed = True
+            idle, self._idle = self._idle, []
+        for runner in idle:
+            runner.close()
+        self._folder.cleanup()
+
+
+_studies: dict[str, _Unpacked] = {}
+_studies_lock = threading.Lock()
+
+
+def run_job(parcel: Parcel, job: Job) -> Outcome:
+    """Run one job; executed in a thread of a Dask worker."""
+    with _studies_lock:
+        if parcel.digest not in _studies:
+            _studies[parcel.digest] = _Unpacked(parcel)
+        study = _studies[parcel.digest]
+    return study.run(job)
+
+
+def close_study(digest: str) -> None:
+    """Drop a study; executed on every Dask worker."""
+    with _studies_lock:
+        study = _studies.pop(digest, None)
+    if study is not None:
+        study.close()

@@ -6,16 +6,14 @@ units in it (``v [mm/s]``).
 """
 
 import csv
-import io
 import re
-import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from thsa_cosim.errors import RecordingError
 from thsa_cosim.recordings.table import Choose, RawColumn, numeric, split_unit
@@ -24,28 +22,26 @@ from thsa_cosim.units import is_unit
 
 _DELIMITERS = ("\t", ";", ",", "|", " ")
 _COMMENTS = ("#", "%", "//")
-_MISSING = (
-    "",
-    "nan",
-    "na",
-    "n/a",
-    "null",
-    "none",
-    "-",
-    "--",
-    "#n/a",
-    "1.#qnan",
-    "-1.#ind",
-    "inf",
-    "-inf",
-    "+inf",
-)
-_NAN_WORDS = ["-", "--", "1.#QNAN", "-1.#IND", "1.#IND", "n/a", "#N/A"]
+_SPECIAL = {
+    **dict.fromkeys(
+        ("", "nan", "na", "n/a", "null", "none", "-", "--", "#n/a", "1.#qnan", "-1.#ind", "1.#ind"), np.nan
+    ),
+    **dict.fromkeys(("inf", "+inf", "1.#inf"), np.inf),
+    **dict.fromkeys(("-inf", "-1.#inf"), -np.inf),
+}
 _NUMBER = {
     mark: re.compile(rf"[+-]?(\d+({re.escape(mark)}\d*)?|{re.escape(mark)}\d+)([eE][+-]?\d+)?")
     for mark in ".,"
 }
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d([ T]\d\d:\d\d.*)?|\d+:\d\d:\d\d.*")
+
+
+class _Dialect(NamedTuple):
+    share: float  # of cells that are numbers
+    delimiter: str
+    decimal: str
+    width: int
+    leading: int  # the column that holds numbers most often
 
 
 @dataclass(frozen=True)
@@ -71,11 +67,9 @@ def read(path: Path, choose: Choose) -> dict[str, RawColumn]:
     layout = _layout(path, numbered)
     rows = [(number, line) for number, line in numbered[layout.first :] if not line.startswith(_COMMENTS)]
     chosen = list(dict.fromkeys(choose([name for name in layout.header if name])))
-    frame = _parse(path, rows, layout)
+    places = [layout.header.index(name) for name in chosen]
     columns: dict[str, RawColumn] = {}
-    for name in chosen:
-        k = layout.header.index(name)
-        column = _column(frame[k], [number for number, _ in rows])
+    for name, k, column in zip(chosen, places, _columns(path, rows, layout, places), strict=True):
         unit = layout.units[k] if k < len(layout.units) and layout.units[k] else split_unit(name)[1]
         time: FloatArray | None = None
         if layout.step is not None:
@@ -121,18 +115,18 @@ def _layout(path: Path, numbered: list[tuple[int, str]]) -> _Layout:
     offset, forced = 0, None
     if lines and (match := re.fullmatch(r"sep=(.)", lines[0].strip().lower())):  # Excel's own hint
         offset, forced = 1, match[1]
-    delimiter, decimal, width = _dialect(path, lines[offset:], (forced,) if forced else _DELIMITERS)
-    return _find_header(path, lines, offset, delimiter, decimal, width)
+    dialect = _dialect(path, lines[offset:], (forced,) if forced else _DELIMITERS)
+    return _find_header(path, lines, offset, dialect)
 
 
-def _dialect(path: Path, lines: Sequence[str], delimiters: Sequence[str]) -> tuple[str, str, int]:
-    """Return delimiter, decimal mark and number of columns that make most cells numbers."""
+def _dialect(path: Path, lines: Sequence[str], delimiters: Sequence[str]) -> _Dialect:
+    """Return the dialect that makes most cells numbers."""
     body = [line for line in lines if not line.startswith(_COMMENTS)]
     # The header is short and the table long: the second half is data, a sample of it will do.
     half = body[len(body) // 2 :]
     sample = half[:: max(1, len(half) // 200)]
     quoted = any('"' in line for line in sample)
-    best: tuple[float, str, str, int] = (0.0, "", "", 0)
+    best = _Dialect(0.0, "", "", 0, 0)
     for delimiter in delimiters:
         rows = [_split(line, delimiter) for line in sample]
         width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
@@ -141,21 +135,21 @@ def _dialect(path: Path, lines: Sequence[str], delimiters: Sequence[str]) -> tup
         for decimal in ".,":
             if decimal == delimiter and not quoted:
                 continue
-            cells = sum(len(row) for row in rows)
-            numbers = sum(_is_number(cell, decimal) for row in rows if len(row) == width for cell in row)
-            if numbers / cells > best[0]:
-                best = (numbers / cells, delimiter, decimal, width)
-    if best[3] == 0:
+            fitting = [[_is_number(cell, decimal) for cell in row] for row in rows if len(row) == width]
+            share = sum(map(sum, fitting)) / sum(map(len, rows))
+            if share > best.share:
+                often = [sum(column) for column in zip(*fitting, strict=True)]
+                best = _Dialect(share, delimiter, decimal, width, often.index(max(often)))
+    if best.width == 0:
         raise RecordingError(
             f"{path}: holds no table of numbers with two columns or more; export it as text with a header row."
         )
-    return best[1:]
+    return best
 
 
-def _find_header(
-    path: Path, lines: Sequence[str], offset: int, delimiter: str, decimal: str, width: int
-) -> _Layout:
+def _find_header(path: Path, lines: Sequence[str], offset: int, dialect: _Dialect) -> _Layout:
     """Find the first row of data, the names above it and the units between."""
+    delimiter, decimal, width = dialect.delimiter, dialect.decimal, dialect.width
     above: list[list[str]] = []
     first = len(lines)
     for k in range(offset, len(lines)):
@@ -163,12 +157,7 @@ def _find_header(
         comment = line.startswith(_COMMENTS)
         cells = _split(line.lstrip("#%/").strip() if comment else line, delimiter)
         fits = width - 1 <= len(cells) <= width
-        if (
-            fits
-            and not comment
-            and any(_is_number(cell, decimal) for cell in cells)
-            and not _are_units(cells, decimal)
-        ):
+        if fits and not comment and _is_data(cells, dialect):
             first = k
             break
         if fits:
@@ -178,6 +167,15 @@ def _find_header(
     units = above.pop() if len(above) > 1 and _are_units(above[-1], decimal) else []
     header = above[-1] if above else [f"column {k + 1}" for k in range(width)]
     return _Layout(delimiter, decimal, width, header, [_bare(unit) for unit in units], first)
+
+
+def _is_data(cells: Sequence[str], dialect: _Dialect) -> bool:
+    """Return whether a row is no header: a number where numbers are, or nothing but numbers and blanks."""
+    numbers = [_is_number(cell, dialect.decimal) for cell in cells]
+    blank = [cell.lower() in _SPECIAL for cell in cells]
+    plain = any(numbers) and all(n or b for n, b in zip(numbers, blank, strict=True))
+    leading = dialect.leading < len(cells) and numbers[dialect.leading]
+    return (plain or leading) and not _are_units(cells, dialect.decimal)
 
 
 def _bare(unit: str) -> str:
@@ -198,7 +196,7 @@ def _labview_layout(path: Path, lines: Sequence[str]) -> _Layout:
         raise RecordingError(f"{path}: holds {len(ends) - 1} LabVIEW segments; export one segment per file.")
     meta: dict[str, list[str]] = {}
     for line in lines[: ends[-1]]:
-        cells = re.split(r"[\t,]", line)
+        cells = line.split("\t" if "\t" in line else ",")
         meta.setdefault(cells[0].strip(), [cell.strip() for cell in cells[1:]])
     delimiter = "," if (meta.get("Separator") or ["Tab"])[0].lower().startswith("comma") else "\t"
     decimal = (
@@ -233,46 +231,64 @@ def _first_number(path: Path, meta: dict[str, list[str]], key: str, decimal: str
         ) from None
 
 
-def _parse(path: Path, rows: Sequence[tuple[int, str]], layout: _Layout) -> pd.DataFrame:
-    text = "\n".join(line for _, line in rows)
+def _columns(
+    path: Path, rows: Sequence[tuple[int, str]], layout: _Layout, places: Sequence[int]
+) -> list[RawColumn]:
+    """Return the columns at ``places``."""
     width = max(layout.width, len(layout.header))
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", pd.errors.ParserWarning)
-            return pd.read_csv(
-                io.StringIO(text),
-                sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
-                decimal=layout.decimal,
-                header=None,
-                names=list(range(width)),
-                index_col=False,
-                na_values=_NAN_WORDS,
-                skipinitialspace=True,
-                float_precision="round_trip",
-                low_memory=False,
-                on_bad_lines="error",
+    for number, line in rows:
+        if '"' not in line and layout.delimiter != " " and line.count(layout.delimiter) < width:
+            continue
+        if len(_split(line, layout.delimiter)) > width:
+            raise RecordingError(
+                f"{path}: line {number} has more cells than the header names; repair the file."
             )
-    except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
-        match = re.search(r"line (\d+)", str(error))
-        where = f"line {rows[int(match[1]) - 1][0]}" if match and int(match[1]) <= len(rows) else "a row"
-        raise RecordingError(
-            f"{path}: {where} has more cells than the header names; repair the file."
-        ) from None
-
-
-def _column(values: "pd.Series[float]", numbers: Sequence[int]) -> RawColumn:
-    if values.dtype.kind in "biuf":
-        return numeric(values.to_numpy())
-    texts = values.astype(str).str.strip()
-    if values.size and _STAMP.fullmatch(texts.iloc[0]):
+    lines = [line for _, line in rows]
+    if layout.decimal == "," and layout.delimiter != ",":
+        lines = [line.replace(",", ".") for line in lines]
+    if layout.decimal == "." or layout.delimiter != ",":
         try:
-            clock = ":" in texts.iloc[0][:3]
-            stamps = pd.to_timedelta(texts) if clock else pd.to_datetime(texts, format="ISO8601")
-            return numeric(stamps.to_numpy())
-        except (ValueError, TypeError):
+            table = np.loadtxt(
+                lines,
+                delimiter=None if layout.delimiter == " " else layout.delimiter,
+                usecols=places,
+                quotechar='"',
+                comments=None,
+                ndmin=2,
+            )
+        except ValueError:
+            pass  # a cell that is blank or no number: find out which
+        else:
+            return [RawColumn(np.ascontiguousarray(column)) for column in table.T]
+    cells = [_split(line, layout.delimiter) for _, line in rows]
+    return [
+        _column(
+            [row[k] if k < len(row) else "" for row in cells], [number for number, _ in rows], layout.decimal
+        )
+        for k in places
+    ]
+
+
+def _column(cells: Sequence[str], numbers: Sequence[int], decimal: str) -> RawColumn:
+    """Return numbers, or seconds since the first time stamp, or what stands in the way."""
+    if cells and _STAMP.fullmatch(cells[0]):
+        try:
+            return _stamps(cells)
+        except ValueError:
             pass
-    bad = np.flatnonzero(pd.to_numeric(texts, errors="coerce").isna() & values.notna())
-    if bad.size == 0:
-        return numeric(pd.to_numeric(texts, errors="coerce").to_numpy(dtype=np.float64))
-    k = int(bad[0])
-    return RawColumn(problem=f"is not numeric: {texts.iloc[k][:30]!r} on line {numbers[k]}")
+    values = np.empty(len(cells))
+    for k, cell in enumerate(cells):
+        if _is_number(cell, decimal):
+            values[k] = float(cell.replace(decimal, "."))
+        elif cell.lower() in _SPECIAL:
+            values[k] = _SPECIAL[cell.lower()]
+        else:
+            return RawColumn(problem=f"is not numeric: {cell[:30]!r} on line {numbers[k]}")
+    return RawColumn(values)
+
+
+def _stamps(cells: Sequence[str]) -> RawColumn:
+    if "-" in cells[0]:
+        return numeric(np.array([cell.removesuffix("Z") for cell in cells], dtype="datetime64[ns]"))
+    clock = np.array([[float(part.replace(",", ".")) for part in cell.split(":")] for cell in cells])
+    return RawColumn(np.asarray(clock @ np.array([3600.0, 60.0, 1.0]), dtype=np.float64), unit="s")

@@ -8,11 +8,11 @@ import pytest
 ca = pytest.importorskip("casadi", reason="the export extra is not installed")
 pytest.importorskip("rumoca", reason="the export extra is not installed")
 
-from thsa_cosim.errors import ModelicaError, ParameterError, ThsaCosimError  # noqa: E402
-from thsa_cosim.export import export_fmu  # noqa: E402
-from thsa_cosim.export.causal import CausalModel, make_causal  # noqa: E402
-from thsa_cosim.export.flatten import flatten  # noqa: E402
-from thsa_cosim.export.units import base_unit  # noqa: E402
+from thsa_cosim.errors import ModelicaError, ParameterError, ThsaCosimError
+from thsa_cosim.export import export_fmu
+from thsa_cosim.export.causal import CausalModel, make_causal
+from thsa_cosim.export.flatten import flatten
+from thsa_cosim.export.units import base_unit
 
 REPO = Path(__file__).parent.parent
 MODELS = Path(__file__).parent / "modelica"

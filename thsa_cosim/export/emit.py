@@ -5,7 +5,7 @@ from math import isinf, isnan
 
 import casadi as ca
 
-from thsa_cosim.export.graph import ROOT, Graph
+from thsa_cosim.export.graph import Graph, Place
 
 _BINARY = {ca.OP_ADD: "{} + {}", ca.OP_SUB: "{} - {}", ca.OP_MUL: "{} * {}", ca.OP_DIV: "{} / {}"}
 _TEXT = {
@@ -51,39 +51,74 @@ def statements(
     ``outputs`` are pairs of an lvalue and a node, ``symbols`` the C text of the symbols, ``cached`` that of nodes whose
     value is there already.
     """
-    targets = [node for _, node in outputs]
-    guard = graph.guards(targets, list(cached))
-    inside: dict[int, list[int]] = {}
-    for node in sorted(guard):
-        inside.setdefault(guard[node], []).append(node)
+    writer = _Writer(graph, [node for _, node in outputs], symbols, cached)
+    lines = writer.write((), writer.order, "  ")
+    return [*lines, *[f"  {target} = {writer.text(node)};" for target, node in outputs]]
 
-    def text(node: int) -> str:
-        entry = graph.nodes[node]
-        if node in cached:
-            return cached[node]
+
+class _Writer:
+    """Writes the nodes of one function; remembers which are written and which were declared ahead."""
+
+    def __init__(
+        self, graph: Graph, targets: list[int], symbols: dict[str, str], cached: dict[int, str]
+    ) -> None:
+        self.graph = graph
+        self.symbols = symbols
+        self.cached = cached
+        self.order = graph.needed(targets, cached)
+        self.guard = graph.guards(targets, list(cached))
+        self.users = graph.users(self.order, cached)
+        self.guarded = {place[: depth + 1] for place in self.guard.values() for depth in range(len(place))}
+        self.written: set[int] = set()
+        self.declared: set[int] = set()
+
+    def text(self, node: int) -> str:
+        """C text of a node's value."""
+        entry = self.graph.nodes[node]
+        if node in self.cached:
+            return self.cached[node]
         if entry.constant is not None:
             return number(entry.constant)
         if entry.symbol is not None:
-            return symbols[entry.symbol]
+            return self.symbols[entry.symbol]
         return f"a{node}"
 
-    def write(place: int, indent: str) -> list[str]:
+    def write(self, place: Place, nodes: list[int], indent: str) -> list[str]:
+        """Statements for those of ``nodes`` that are guarded by ``place``, with the blocks that they need."""
         lines: list[str] = []
-        for node in inside.get(place, []):
-            entry = graph.nodes[node]
-            if entry.op is None or node in cached:
+        for node in nodes:
+            entry = self.graph.nodes[node]
+            if self.guard[node] != place or node in self.written or entry.op is None or node in self.cached:
                 continue
-            arguments = [text(argument) for argument in entry.arguments]
-            if node in inside:
-                lines.append(f"{indent}double a{node} = 0.0;")
-                lines.append(f"{indent}if ({arguments[0]} != 0.0) {{")
-                lines += write(node, indent + "  ")
-                lines.append(f"{indent}  a{node} = {arguments[1]};")
-                lines.append(f"{indent}}}")
-            elif entry.op in _CALLS:
-                lines.append(f"{indent}const double a{node} = {_CALLS[entry.op]}({', '.join(arguments)});")
+            self.written.add(node)
+            arguments = [self.text(argument) for argument in entry.arguments]
+            inner = (*place, entry.arguments[0])
+            if entry.op == ca.OP_IF_ELSE_ZERO and inner in self.guarded:
+                lines += self._block(node, inner, arguments, indent)
             else:
-                lines.append(f"{indent}const double a{node} = {_TEXT[entry.op].format(*arguments)};")
+                call = _CALLS.get(entry.op)
+                value = f"{call}({', '.join(arguments)})" if call else _TEXT[entry.op].format(*arguments)
+                lines.append(f"{indent}{self._target(node)} = {value};")
         return lines
 
-    return [*write(ROOT, "  "), *[f"  {target} = {text(node)};" for target, node in outputs]]
+    def _target(self, node: int) -> str:
+        return f"a{node}" if node in self.declared else f"const double a{node}"
+
+    def _block(self, node: int, inner: Place, arguments: list[str], indent: str) -> list[str]:
+        """``if (condition) { … }`` for one conditional; what other blocks use too is declared ahead."""
+        below = self.graph.needed([self.graph.nodes[node].arguments[1]], self.cached)
+        batch = [n for n in below if self.guard[n][: len(inner)] == inner and n not in self.written]
+        ahead = [] if node in self.declared else [node]
+        inside = {*batch, node}
+        for member in batch:
+            entry = self.graph.nodes[member]
+            if entry.op is None or member in self.cached or member in self.declared:
+                continue
+            if not inside.issuperset(self.users[member]):
+                ahead.append(member)
+        self.declared.update(ahead)
+        lines = [f"{indent}double a{member} = 0.0;" for member in ahead]
+        lines.append(f"{indent}if ({arguments[0]} != 0.0) {{")
+        lines += self.write(inner, batch, indent + "  ")
+        lines += [f"{indent}  a{node} = {arguments[1]};", f"{indent}}}"]
+        return lines

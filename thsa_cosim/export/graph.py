@@ -10,7 +10,7 @@ _CHEAP = {ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_NEG, ca.OP_SQ, ca.OP_TWICE, ca.
           ca.OP_AND, ca.OP_OR, ca.OP_IF_ELSE_ZERO, ca.OP_FABS}  # fmt: skip
 _QUOTIENTS = {ca.OP_DIV, ca.OP_INV, ca.OP_SQRT}
 
-ROOT = -1
+Place = tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -115,46 +115,60 @@ class Graph:
                     stack.extend(self.nodes[node].arguments)
         return sorted(found)
 
-    def guards(self, outputs: Sequence[int], given: Sequence[int], threshold: int = 12) -> dict[int, int]:
-        """For every needed node the conditional under whose value it is evaluated, ROOT for always.
+    def users(self, order: Sequence[int], given: Iterable[int] = ()) -> dict[int, list[int]]:
+        """For every node of ``order`` the nodes of ``order`` that use it; the ``given`` ones use nothing."""
+        stop = set(given)
+        found: dict[int, list[int]] = {node: [] for node in order}
+        for node in order:
+            if node not in stop:
+                for argument in self.nodes[node].arguments:
+                    found[argument].append(node)
+        return found
 
-        A node that only the value of ``condition ? value : 0`` needs is guarded by that conditional, so that a branch
-        not taken costs nothing; conditionals whose value is cheaper than ``threshold`` guard nothing.
+    def guards(self, outputs: Sequence[int], given: Sequence[int], threshold: int = 12) -> dict[int, Place]:
+        """For every needed node the conditions under which alone it is evaluated, outermost first; () for always.
+
+        A node that only values of ``condition ? value : 0`` need is guarded by that condition, so that a branch not
+        taken costs nothing; conditions that would guard less than ``threshold`` additions guard nothing.
         """
         order = self.needed(outputs, given)
-        loose: set[int] = set()
+        loose: set[Place] = set()
         while True:
             guard = self._assign(order, set(outputs), set(given), loose)
-            worth: dict[int, int] = {}
-            for node in order:
-                place = guard[node]
-                while place != ROOT:
-                    worth[place] = worth.get(place, 0) + self.nodes[node].cost
-                    place = guard[place]
+            worth: dict[Place, int] = {}
+            for node, place in guard.items():
+                for depth in range(len(place)):
+                    worth[place[: depth + 1]] = worth.get(place[: depth + 1], 0) + self.nodes[node].cost
             cheap = {place for place, cost in worth.items() if cost < threshold}
             if not cheap:
                 return guard
             loose |= cheap
 
-    def _assign(self, order: list[int], roots: set[int], given: set[int], loose: set[int]) -> dict[int, int]:
-        users: dict[int, list[tuple[int, bool]]] = {node: [] for node in order}
-        for node in order:
-            if node not in given:
-                conditional = self.nodes[node].op == ca.OP_IF_ELSE_ZERO and node not in loose
-                for position, argument in enumerate(self.nodes[node].arguments):
-                    users[argument].append((node, conditional and position == 1))
-        guard: dict[int, int] = {}
-        depth = {ROOT: 0}
+    def _assign(
+        self, order: list[int], roots: set[int], given: set[int], loose: set[Place]
+    ) -> dict[int, Place]:
+        users = self.users(order, given)
+        guard: dict[int, Place] = {}
         for node in reversed(order):
-            places = [ROOT] if node in roots or node in given else []
-            places += [user if value else guard[user] for user, value in users[node]]
-            place = places[0]
-            for other in places[1:]:
-                while place != other:
-                    if depth[place] >= depth[other]:
-                        place = guard[place]
-                    else:
-                        other = guard[other]
-            guard[node] = place
-            depth[node] = depth[place] + 1
+            places = (
+                [()]
+                if node in roots or node in given
+                else [self.place(u, node, guard, loose) for u in users[node]]
+            )
+            shared = places[0]
+            for place in places[1:]:
+                depth = 0
+                while depth < min(len(shared), len(place)) and shared[depth] == place[depth]:
+                    depth += 1
+                shared = shared[:depth]
+            guard[node] = shared
         return guard
+
+    def place(self, user: int, node: int, guard: dict[int, Place], loose: set[Place]) -> Place:
+        """Where ``user`` needs ``node``: under its condition if the node is its value, else where it is itself."""
+        entry = self.nodes[user]
+        if entry.op == ca.OP_IF_ELSE_ZERO and entry.arguments[1] == node and entry.arguments[0] != node:
+            inner = (*guard[user], entry.arguments[0])
+            if inner not in loose:
+                return inner
+        return guard[user]

@@ -8,6 +8,7 @@ elsewhere, by Dask; each job has exactly one outcome.
 
 import contextlib
 import hashlib
+import importlib
 import pickle
 import threading
 import uuid
@@ -73,7 +74,7 @@ class ClusterRunner:
             If the scheduler does not answer or has no workers.
         """
         try:
-            import distributed
+            distributed: Any = importlib.import_module("distributed")
         except ImportError:
             raise MissingExtraError("Running on a cluster", "cluster") from None
         self._distributed = distributed

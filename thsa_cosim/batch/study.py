@@ -2,7 +2,6 @@
 
 import pickle
 import shutil
-import sys
 import tempfile
 from collections.abc import Sequence
 from multiprocessing import spawn
@@ -53,8 +52,10 @@ class Study:
             self.descriptions[name] = found
             data = pickle.dumps((experiment, found, str(self._fmu_folder(found))), pickle.HIGHEST_PROTOCOL)
             if b"__main__" in data and self.main is None:
-                self.main = spawn.get_preparation_data("thsa-cosim worker")
-                self.main["sys_path"] = list(sys.path)
+                data_of_main = spawn.get_preparation_data("thsa-cosim worker")
+                # Only what it takes to import the main module (the rest may not, or need not, travel).
+                wanted = ("init_main_from_name", "init_main_from_path")
+                self.main = {key: data_of_main[key] for key in wanted if key in data_of_main}
             (self.folder / "experiments" / f"{self.index[name]}.pickle").write_bytes(data)
 
     def _fmu_folder(self, description: FmuDescription) -> Path:

@@ -1,0 +1,259 @@
+"""Simulate once per recording and compare: what ``thsa-cosim simulate`` does."""
+
+import csv
+import json
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from thsa_cosim import __version__
+from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Runner
+from thsa_cosim.costs import nrmse, rmse
+from thsa_cosim.errors import ScenarioError, StudyError
+from thsa_cosim.recordings import Recording
+from thsa_cosim.scenario import Scenario
+from thsa_cosim.signals import FloatArray, Signals
+
+RESULT = "result.json"
+
+OnRecording = Callable[[int, int], None]
+"""Called with (simulated, all) recordings after each one."""
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """How well one output follows its recording; ``rmse`` and ``noise`` in ``unit``."""
+
+    rmse: float
+    nrmse: float
+    """rmse over the range of the measured signal."""
+    noise: float
+    """1 σ of the recording's noise: the scenario's, else an estimate from the recording."""
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedRecording:
+    """One recording, simulated; ``simulated`` is None and ``reason`` says why if that failed."""
+
+    name: str
+    role: str
+    """"fit" or "validate": where the scenario names the recording."""
+    temperature_degC: float | None
+    measured: Signals
+    """All recorded channels at the recording's samples."""
+    simulated: Signals | None
+    """The FMU's outputs at the communication points, in its units."""
+    errors: Mapping[str, ChannelFit]
+    status: str
+    reason: str
+    duration_s: float
+    console: str
+
+
+@dataclass(frozen=True, eq=False)
+class SimulateResult:
+    """What ``simulate`` found."""
+
+    scenario: Scenario
+    recordings: tuple[SimulatedRecording, ...]
+    failures: Mapping[str, int]
+    """reason -> number of recordings"""
+    files: tuple[Path, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of result.json: plain JSON types."""
+        return {
+            "kind": "simulate",
+            "status": "complete",
+            "title": self.scenario.title,
+            "seed": self.scenario.seed,
+            "evaluations": len(self.recordings),
+            "failures": dict(self.failures),
+            "fmu": {"path": str(self.scenario.fmu.path), "sha256": self.scenario.fmu.sha256},
+            "version": __version__,
+            "recordings": [
+                {
+                    "name": r.name,
+                    "role": r.role,
+                    "temperature_degC": r.temperature_degC,
+                    "status": r.status,
+                    "reason": r.reason,
+                    "duration_s": r.duration_s,
+                    "error": {
+                        channel: {
+                            "rmse": e.rmse,
+                            "nrmse": e.nrmse if np.isfinite(e.nrmse) else None,
+                            "noise": e.noise,
+                            "unit": e.unit,
+                        }
+                        for channel, e in r.errors.items()
+                    },
+                }
+                for r in self.recordings
+            ],
+        }
+
+
+def simulate(
+    scenario: Scenario,
+    *,
+    folder: Path,
+    workers: int = 1,
+    cluster: str | None = None,
+    on_recording: OnRecording | None = None,
+) -> SimulateResult:
+    """Run every recording of ``scenario`` once; write result.json and one CSV per recording to ``folder``.
+
+    Parameters that the scenario would identify take their start values (without: the middle of their bounds).
+    A recording whose simulation fails is part of the result, with its reason.
+
+    Raises
+    ------
+    InputError
+        If the scenario and its recordings do not fit together.
+    StudyError
+        If every simulation failed.
+    """
+    cases = _cases(scenario)
+    done = 0
+
+    def count(_index: int, _outcome: Outcome) -> None:
+        nonlocal done
+        done += 1
+        if on_recording is not None:
+            on_recording(done, len(cases))
+
+    with _open_runner(scenario, [experiment for *_, experiment in cases], workers, cluster) as runner:
+        outcomes = runner.run([Job(e.name) for *_, e in cases], count)
+    results = tuple(
+        _compare(scenario, recording, role, outcome)
+        for (recording, role, _), outcome in zip(cases, outcomes, strict=True)
+    )
+    failures = Counter(r.reason for r in results if r.simulated is None)
+    if failures and failures.total() == len(results):
+        reason, number = failures.most_common(1)[0]
+        raise StudyError(f"All {len(results)} simulations failed, {number} of them because {reason}.")
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [_write_csv(folder, r) for r in results if r.simulated is not None]
+    result = SimulateResult(scenario, results, failures, (folder / RESULT, *files))
+    partial = folder / f"{RESULT}.part"
+    partial.write_text(json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    partial.replace(folder / RESULT)
+    return result
+
+
+def _cases(scenario: Scenario) -> list[tuple[Recording, str, Experiment]]:
+    cases = []
+    for role, recordings in (("fit", scenario.fit), ("validate", scenario.validate)):
+        for recording in recordings:
+            point = next((p for p in scenario.points if recording in (*p.fit, *p.validate)), None)
+            space, fixed = scenario.parameters, scenario.fixed
+            if point is not None:
+                space, fixed = point.space, point.fixed
+            start = space.assignments(space.decode(space.start()), recording.name) if len(space) else {}
+            experiment = Experiment(
+                name=f"{role}/{recording.name}",
+                fmu=scenario.fmu.path,
+                inputs=scenario.drive(recording),
+                outputs=scenario.outputs,
+                time=_grid(scenario, recording),
+                fixed={**fixed, **start},
+                tolerance=scenario.simulation.tolerance,
+            )
+            cases.append((recording, role, experiment))
+    return cases
+
+
+def _grid(scenario: Scenario, recording: Recording) -> FloatArray:
+    """Communication points (n,) s: the recording's samples, or every ``simulation.step``."""
+    time, step = recording.signals.time, scenario.simulation.step
+    if step is None:
+        return time
+    count = int(np.floor((time[-1] - time[0]) / step * (1.0 + 1e-12))) + 1
+    if count < 2:
+        raise ScenarioError(
+            f"{scenario.path}: simulation.step = {step:g} s is longer than {recording.path}; lower it."
+        )
+    return np.asarray(time[0] + step * np.arange(count))
+
+
+def _open_runner(
+    scenario: Scenario, experiments: Sequence[Experiment], workers: int, cluster: str | None
+) -> Runner:
+    spec = scenario.simulation
+    if cluster is not None:
+        from thsa_cosim.batch.cluster import ClusterRunner
+
+        return ClusterRunner(
+            experiments,
+            cluster,
+            deadline_s=spec.deadline,
+            memory_limit_mb=spec.memory_mb,
+            reuse=spec.reuse,
+            kind=spec.interface,
+        )
+    return LocalRunner(
+        experiments,
+        workers=min(workers, max(len(experiments), 1)),
+        deadline_s=spec.deadline,
+        memory_limit_mb=spec.memory_mb,
+        reuse=spec.reuse,
+        kind=spec.interface,
+    )
+
+
+def _compare(scenario: Scenario, recording: Recording, role: str, outcome: Outcome) -> SimulatedRecording:
+    measured = recording.signals.select(scenario.measured)
+    errors: dict[str, ChannelFit] = {}
+    if outcome.signals is not None:
+        reached = measured.time <= outcome.signals.time[-1] * (1.0 + 1e-12) + 1e-9
+        samples = measured.time[reached]
+        at_samples = outcome.signals.select(measured.names).resample(samples)
+        for name in measured.names:
+            spec = scenario.cost.channels.get(name)
+            given = spec.noise if spec is not None else None
+            errors[name] = ChannelFit(
+                rmse=rmse(measured[name][reached], at_samples[name]),
+                nrmse=nrmse(measured[name][reached], at_samples[name]),
+                noise=given if given is not None else recording.noise.get(name, 0.0),
+                unit=measured.units[name],
+            )
+    return SimulatedRecording(
+        name=recording.name,
+        role=role,
+        temperature_degC=recording.temperature_degC,
+        measured=measured,
+        simulated=outcome.signals,
+        errors=errors,
+        status=str(outcome.status),
+        reason=outcome.reason,
+        duration_s=outcome.duration_s,
+        console=outcome.console,
+    )
+
+
+def _write_csv(folder: Path, result: SimulatedRecording) -> Path:
+    """Columns ``time [s]``, ``<name> [unit]`` and, where recorded, ``<name> measured [unit]``."""
+    assert result.simulated is not None
+    simulated = result.simulated
+    measured = result.measured.resample(simulated.time)
+    header, columns = ["time [s]"], [simulated.time]
+    for name in simulated.names:
+        header.append(f"{name} [{simulated.units[name]}]")
+        columns.append(simulated[name])
+        if name in measured:
+            header.append(f"{name} measured [{measured.units[name]}]")
+            columns.append(measured[name])
+    safe = re.sub(r"[^\w.+-]+", "_", f"{result.role}_{result.name}")
+    path = folder / f"{safe}.csv"
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(header)
+        writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
+    return path

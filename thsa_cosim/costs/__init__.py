@@ -6,8 +6,11 @@
     the cost of an identification, equation 6 of the article.
 ``control``
     the cost of a control law, equation 7 of the article.
+``channels``
+    a measured signal to be met, and what a worker sends back instead of whole signals.
 """
 
+from thsa_cosim.costs.channels import Channel, ResidualReducer, TermsReducer
 from thsa_cosim.costs.control import ControlCost, control_cost
 from thsa_cosim.costs.identification import (
     ERRORS,
@@ -29,8 +32,11 @@ from thsa_cosim.costs.metrics import (
 
 __all__ = [
     "ERRORS",
+    "Channel",
     "ControlCost",
     "ErrorFunction",
+    "ResidualReducer",
+    "TermsReducer",
     "control_cost",
     "error_terms",
     "first_reach",

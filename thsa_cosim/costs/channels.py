@@ -1,0 +1,62 @@
+"""What a worker sends back instead of whole signals: weighted residuals, or their cost terms.
+
+Both are plain picklable objects; a worker receives them once per study with its experiments.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from thsa_cosim.costs.identification import error_terms
+from thsa_cosim.signals import FloatArray, Signals
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One measured signal to be met: samples (n,) at ``time`` (n,) in s, in the FMU variable's unit.
+
+    ``noise``: one standard deviation in that unit; ``weight`` multiplies the squared error. The samples
+    outside the cost's window are left out beforehand.
+    """
+
+    name: str
+    time: FloatArray
+    measured: FloatArray
+    noise: float
+    weight: float = 1.0
+
+    def residual(self, simulated: Signals) -> FloatArray:
+        """√weight · (simulated - measured) / noise, (n,); linear between samples where times differ."""
+        values = simulated[self.name]
+        if simulated.time.shape != self.time.shape or not np.array_equal(simulated.time, self.time):
+            values = np.interp(self.time, simulated.time, values)
+        return np.asarray((values - self.measured) * (np.sqrt(self.weight) / self.noise))
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualReducer:
+    """Signals → the residuals of all channels, one after the other (N,)."""
+
+    channels: tuple[Channel, ...]
+
+    def __call__(self, simulated: Signals) -> FloatArray:
+        """Return the stacked residuals (N,), dimensionless."""
+        return np.concatenate([channel.residual(simulated) for channel in self.channels])
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Samples per channel, in order."""
+        return tuple(channel.measured.size for channel in self.channels)
+
+
+@dataclass(frozen=True, eq=False)
+class TermsReducer:
+    """Signals → the cost term of each channel (c,), equation 6."""
+
+    channels: tuple[Channel, ...]
+    error: str = "squared"
+
+    def __call__(self, simulated: Signals) -> FloatArray:
+        """Return Σ f(residual) per channel (c,), dimensionless."""
+        terms = error_terms({c.name: c.residual(simulated) for c in self.channels}, self.error)
+        return np.array([terms[c.name] for c in self.channels])

@@ -1,0 +1,34 @@
+"""Identification: measured recordings → parameters per temperature → laws, each with how sure it is.
+
+``run``               the use case as a function
+``problem``           scenario → what is searched at each point
+``point``             the search at one point: evolution, polish, uncertainty
+``interleave``        all points' searches over one runner
+``evaluate``          vectors → simulations → costs, with the journal
+``over_temperature``  points → laws
+``compare``           simulated against measured
+``study``             the study folder
+``results``           what comes out
+"""
+
+from thsa_cosim.identify.results import (
+    ChannelError,
+    Comparison,
+    Estimate,
+    IdentifyResult,
+    LawResult,
+    PointResult,
+    Progress,
+)
+from thsa_cosim.identify.run import identify
+
+__all__ = [
+    "ChannelError",
+    "Comparison",
+    "Estimate",
+    "IdentifyResult",
+    "LawResult",
+    "PointResult",
+    "Progress",
+    "identify",
+]

@@ -1,0 +1,62 @@
+"""Simulated against measured: per recording and channel, and over all recordings of a role."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from thsa_cosim.costs import nrmse, rmse, signal_range
+from thsa_cosim.identify.problem import Case
+from thsa_cosim.identify.results import ChannelError, Comparison
+from thsa_cosim.recordings import Recording
+from thsa_cosim.signals import Signals
+
+
+def compare(
+    case: Case, recording: Recording, role: str, simulated: Signals, noise: Mapping[str, float]
+) -> Comparison:
+    """Errors of every measured signal of a recording over all of its samples.
+
+    ``noise``: 1 σ per fitted channel in the FMU's unit; for the others the recording's own estimate counts.
+    """
+    measured = case.measured
+    on_samples = simulated.select(measured.names).resample(measured.time)
+    errors = {
+        name: ChannelError(
+            rmse=rmse(measured[name], on_samples[name]),
+            nrmse=nrmse(measured[name], on_samples[name]),
+            noise=noise.get(name, recording.noise.get(name, 0.0)),
+            unit=measured.units[name],
+            samples=measured.time.size,
+        )
+        for name in measured.names
+    }
+    return Comparison(
+        recording=case.name,
+        role=role,
+        temperature_degC=case.temperature_degC,
+        measured=measured,
+        simulated=on_samples,
+        errors=errors,
+    )
+
+
+def summarise(comparisons: Sequence[Comparison]) -> dict[str, dict[str, ChannelError]]:
+    """Errors per role and channel over all samples; nrmse relative to the range over all recordings."""
+    summary: dict[str, dict[str, ChannelError]] = {"fit": {}, "validate": {}}
+    for role, channels in summary.items():
+        members = [c for c in comparisons if c.role == role]
+        for name in members[0].errors if members else ():
+            measured = np.concatenate([c.measured[name] for c in members])
+            simulated = np.concatenate([c.simulated[name] for c in members])
+            weights = np.array([c.errors[name].samples for c in members], dtype=np.float64)
+            noises = np.array([c.errors[name].noise for c in members])
+            error = rmse(measured, simulated)
+            span = signal_range(measured)
+            channels[name] = ChannelError(
+                rmse=error,
+                nrmse=error / span if span > 0.0 else float("nan"),
+                noise=float(np.sqrt(np.sum(weights * noises**2) / np.sum(weights))),
+                unit=members[0].errors[name].unit,
+                samples=measured.size,
+            )
+    return summary

@@ -1,0 +1,77 @@
+"""From points to laws, and from laws back to values at any temperature."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from thsa_cosim.errors import InputError
+from thsa_cosim.identify.results import LawResult, PointResult
+from thsa_cosim.laws import FORMS, fit_law, largest_deviation, published_law, select_law
+from thsa_cosim.scenario import LawSpec
+
+
+def fit_laws(
+    points: Sequence[PointResult], specs: Mapping[str, LawSpec]
+) -> tuple[dict[str, LawResult], list[str]]:
+    """Fit the wanted laws to the points; also return one sentence per law that could not be fitted."""
+    laws: dict[str, LawResult] = {}
+    notes: list[str] = []
+    for name, spec in specs.items():
+        members = [p for p in points if p.temperature_degC is not None and name in p.parameters]
+        if len(members) < 2:
+            notes.append(f"{name} has no law: it was identified at fewer than two temperatures.")
+            continue
+        t = np.array([p.temperature_degC for p in members], dtype=np.float64)
+        estimates = [p.parameters[name] for p in members]
+        values = np.array([e.value for e in estimates])
+        stderr = np.array([np.nan if e.stderr is None else e.stderr for e in estimates])
+        best, candidates = select_law(t, values, stderr)
+        if spec.form is not None:
+            needed = FORMS[spec.form] or 2
+            if len(members) < needed:
+                notes.append(
+                    f"{name} has no {spec.form} law: that needs {needed} temperatures, there are {len(members)}."
+                )
+                continue
+            best = fit_law(spec.form, t, values, stderr)
+        published = None
+        deviation = law_deviation = None
+        if spec.published is not None and spec.published_form is not None:
+            published = published_law(spec.published_form, spec.published)
+            true = published(t)
+            deviation = float(np.max(np.abs(values - true)) / np.max(np.abs(true)))
+            law_deviation = largest_deviation(best, published, t)
+        laws[name] = LawResult(
+            parameter=name,
+            unit=estimates[0].unit,
+            law=best,
+            candidates=candidates,
+            selected=spec.form is None,
+            published=published,
+            deviation=deviation,
+            law_deviation=law_deviation,
+        )
+    return laws, notes
+
+
+def values_at(
+    temperature: float | None,
+    names: Sequence[str],
+    points: Sequence[PointResult],
+    laws: Mapping[str, LawResult],
+    round_to: float,
+) -> dict[str, float]:
+    """Values of ``names`` for a recording at ``temperature`` (degC): its own point's, else the laws'.
+
+    Raises InputError, in one sentence, when neither is there.
+    """
+    for point in points:
+        own = point.temperature_degC
+        near = own is None or (temperature is not None and abs(own - temperature) <= 0.5 * round_to)
+        if near and all(name in point.parameters for name in names):
+            return {name: point.parameters[name].value for name in names}
+    missing = [name for name in names if name not in laws]
+    if temperature is None or missing:
+        what = "it has no temperature" if temperature is None else f"{missing[0]} has neither point nor law"
+        raise InputError(f"no parameters for it: {what} there")
+    return {name: float(laws[name].law(temperature)) for name in names}

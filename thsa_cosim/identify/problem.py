@@ -1,0 +1,140 @@
+"""What is to be identified at a point, cut loose from files: recordings, channels, parameters."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from thsa_cosim.batch import Experiment, Reducer
+from thsa_cosim.costs import window_mask
+from thsa_cosim.costs.channels import Channel
+from thsa_cosim.errors import ScenarioError
+from thsa_cosim.parameters import ParameterSpace
+from thsa_cosim.recordings import Recording
+from thsa_cosim.scenario import Scenario, TemperaturePoint
+from thsa_cosim.signals import FloatArray, Signals
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One recording as a simulation: ``inputs`` drive the FMU over ``time`` (n,) in s.
+
+    ``channels`` are fitted, within the cost's window; ``measured`` holds all samples of those signals.
+    ``fixed``: start values that every run has, in the FMU's units.
+    """
+
+    name: str
+    fmu: Path
+    inputs: Signals
+    time: FloatArray
+    fixed: Mapping[str, float]
+    channels: tuple[Channel, ...]
+    measured: Signals
+    temperature_degC: float | None
+    tolerance: float | None
+
+    def experiment(self, name: str, reduce: Reducer | None) -> Experiment:
+        """The simulation under ``name`` with what the worker makes of its signals."""
+        return Experiment(
+            name=name,
+            fmu=self.fmu,
+            inputs=self.inputs,
+            outputs=self.measured.names,
+            time=self.time,
+            fixed=self.fixed,
+            tolerance=self.tolerance,
+            reduce=reduce,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PointProblem:
+    """The recordings at one temperature (or all of them) and the parameters they share."""
+
+    label: str
+    temperature_degC: float | None
+    cases: tuple[Case, ...]
+    space: ParameterSpace
+    error: str
+
+    @property
+    def channel_names(self) -> tuple[str, ...]:
+        """Names of the fitted signals, in order."""
+        return tuple(channel.name for channel in self.cases[0].channels)
+
+    @property
+    def samples(self) -> int:
+        """Number of residuals N."""
+        return sum(channel.measured.size for case in self.cases for channel in case.channels)
+
+    @property
+    def groups(self) -> Sequence[Sequence[slice]]:
+        """Per recording the slices of its channels in the stacked residuals."""
+        groups, position = [], 0
+        for case in self.cases:
+            slices = []
+            for channel in case.channels:
+                slices.append(slice(position, position + channel.measured.size))
+                position += channel.measured.size
+            groups.append(slices)
+        return groups
+
+
+def build_case(scenario: Scenario, recording: Recording, fixed: Mapping[str, float]) -> Case:
+    """A recording as a simulation; ScenarioError if the cost's window leaves no sample of it."""
+    time = recording.signals.time
+    grid, step = time, scenario.simulation.step
+    if step is not None:
+        count = int(np.floor((time[-1] - time[0]) / step * (1.0 + 1e-12))) + 1
+        if count < 2:
+            raise ScenarioError(
+                f"{scenario.path}: simulation.step = {step:g} s is longer than {recording.path}; lower it."
+            )
+        grid = time[0] + step * np.arange(count)
+    counted = _counted(scenario, time) & (time <= grid[-1] + 1e-9 * abs(grid[-1]))
+    if np.count_nonzero(counted) < 2:
+        raise ScenarioError(
+            f"{scenario.path}: cost.window and cost.mask leave no sample of {recording.path}; widen them."
+        )
+    channels = tuple(
+        Channel(
+            name=name,
+            time=time[counted],
+            measured=recording.signals[name][counted],
+            noise=scenario.noise(recording, name),
+            weight=spec.weight,
+        )
+        for name, spec in scenario.cost.channels.items()
+    )
+    return Case(
+        name=recording.name,
+        fmu=scenario.fmu.path,
+        inputs=scenario.drive(recording),
+        time=grid,
+        fixed=fixed,
+        channels=channels,
+        measured=recording.signals.select(scenario.measured),
+        temperature_degC=recording.temperature_degC,
+        tolerance=scenario.simulation.tolerance,
+    )
+
+
+def _counted(scenario: Scenario, time: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Which samples (n,) count: inside the window, outside every masked span; s after the first sample."""
+    elapsed = time - time[0]
+    counted = window_mask(elapsed, scenario.cost.start, scenario.cost.stop)
+    for begin, end in scenario.cost.mask:
+        counted &= ~window_mask(elapsed, begin, end)
+    return counted
+
+
+def build_point(scenario: Scenario, point: TemperaturePoint) -> PointProblem:
+    """The search at one of the scenario's points."""
+    return PointProblem(
+        label=point.label,
+        temperature_degC=point.temperature_degC,
+        cases=tuple(build_case(scenario, recording, point.fixed) for recording in point.fit),
+        space=point.space,
+        error=scenario.cost.error,
+    )

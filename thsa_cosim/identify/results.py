@@ -1,0 +1,127 @@
+"""What an identification returns: plain frozen objects, values in the parameters' own units."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from thsa_cosim.laws import Law
+from thsa_cosim.search import Generation
+from thsa_cosim.signals import FloatArray, Signals
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter at one point; ``stderr`` is None where none can be given.
+
+    ``identifiable`` is False with a ``reason`` when the data do not determine the value.
+    """
+
+    value: float
+    unit: str
+    stderr: float | None
+    identifiable: bool
+    reason: str
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class ChannelError:
+    """How well a measured signal is met: rmse and noise (1 σ) in ``unit``, nrmse over the measured range."""
+
+    rmse: float
+    nrmse: float
+    noise: float
+    unit: str
+    samples: int
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Measured and simulated signals of one recording, each channel (n,) in the FMU variable's unit."""
+
+    recording: str
+    role: str
+    temperature_degC: float | None
+    measured: Signals
+    simulated: Signals
+    errors: Mapping[str, ChannelError]
+
+
+@dataclass(frozen=True)
+class PointResult:
+    """What was found at one temperature.
+
+    ``cost``: equation 6 at the estimate; ``cost_per_sample`` is 1 when only the stated noise is left.
+    ``correlation`` (n, n) follows the order of ``parameters``. ``converged`` and ``stopped`` tell how the
+    evolution ended, ``polished`` how the least-squares polish did (empty if there was none).
+    """
+
+    label: str
+    temperature_degC: float | None
+    recordings: tuple[str, ...]
+    parameters: Mapping[str, Estimate]
+    correlation: FloatArray
+    cost: float
+    cost_per_sample: float
+    terms: Mapping[str, float]
+    generations: tuple[Generation, ...]
+    evaluations: int
+    converged: bool
+    stopped: str
+    polished: str
+
+
+@dataclass(frozen=True)
+class LawResult:
+    """A parameter's law over temperature, the candidates it was chosen from, and the published one."""
+
+    parameter: str
+    unit: str
+    law: Law
+    candidates: tuple[Law, ...]
+    selected: bool
+    published: Law | None
+    deviation: float | None
+    """Largest distance of the points from the published curve, relative to its largest value."""
+    law_deviation: float | None
+    """The same for the fitted law at the points' temperatures."""
+
+
+@dataclass(frozen=True)
+class IdentifyResult:
+    """An identification, complete or interrupted."""
+
+    title: str
+    status: str
+    seed: int
+    version: str
+    fmu: Path
+    fmu_sha256: str
+    scenario: Path
+    points: tuple[PointResult, ...]
+    planned_points: int
+    laws: Mapping[str, LawResult]
+    comparisons: tuple[Comparison, ...]
+    errors: Mapping[str, Mapping[str, ChannelError]]
+    evaluations: int
+    failures: Mapping[str, int]
+    notes: tuple[str, ...] = ()
+    settings: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a study is; ``planned`` shrinks when a search converges early.
+
+    ``runs`` counts simulations (evaluated vector × recording), ``reused`` those taken from the journal.
+    ``best``: lowest cost per sample so far, by point.
+    """
+
+    stage: str
+    runs: int
+    planned: int
+    reused: int
+    failures: int
+    best: Mapping[str, float]
+    generation: int

@@ -1,0 +1,261 @@
+"""The use case: scenario → searches over a runner → parameters per point → laws → result."""
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from thsa_cosim import __version__
+from thsa_cosim.batch import Job, Journal, LocalRunner, Runner
+from thsa_cosim.errors import InputError, StudyError
+from thsa_cosim.identify.compare import compare, summarise
+from thsa_cosim.identify.evaluate import Evaluator, Reply, Request, residual_experiment, terms_experiment
+from thsa_cosim.identify.interleave import interleave
+from thsa_cosim.identify.over_temperature import fit_laws, values_at
+from thsa_cosim.identify.point import PointSearch, search_point
+from thsa_cosim.identify.problem import Case, PointProblem, build_case, build_point
+from thsa_cosim.identify.results import Comparison, IdentifyResult, LawResult, PointResult, Progress
+from thsa_cosim.identify.study import open_study
+from thsa_cosim.recordings import Recording
+from thsa_cosim.scenario import Scenario
+from thsa_cosim.search import EvolutionSettings, Generation
+
+JOURNAL = "journal.csv"
+OnProgress = Callable[[Progress], None]
+
+
+def identify(
+    scenario: Scenario,
+    *,
+    folder: Path,
+    workers: int = 1,
+    cluster: str | None = None,
+    on_progress: OnProgress | None = None,
+) -> IdentifyResult:
+    """Identify the scenario's parameters in the study folder ``folder``; continue what it holds.
+
+    A KeyboardInterrupt ends the study early: the result then has the status "interrupted" and the points
+    that were finished. The same call continues it, and ends with what an undisturbed run would have found.
+
+    Raises
+    ------
+    InputError
+        If the folder holds a different study, or recordings and settings do not fit together.
+    StudyError
+        If no point could be identified because every simulation failed.
+    """
+    points = [build_point(scenario, point) for point in scenario.points]
+    held_out = _held_out_cases(scenario)
+    open_study(folder, study_identity(scenario))
+    names = tuple(dict.fromkeys(name for point in points for name in point.space.names))
+    channels = points[0].channel_names
+    study = _Study(scenario, points, held_out)
+    with Journal.open(folder / JOURNAL, names, channels) as journal:
+        try:
+            with _open_runner(scenario, points, held_out, workers, cluster) as runner:
+                evaluator = Evaluator(runner, journal, points, names, channels, on_progress)
+                study.search(evaluator)
+                study.validate(runner)
+        except KeyboardInterrupt:
+            study.interrupted = True
+    return study.result()
+
+
+class _Study:
+    """What has been found so far."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        points: Sequence[PointProblem],
+        held_out: Sequence[tuple[Case, Recording]],
+    ) -> None:
+        self.interrupted = False
+        self._scenario = scenario
+        self._points = points
+        self._held_out = held_out
+        self._found: dict[int, PointSearch] = {}
+        self._comparisons: list[Comparison] = []
+        self._notes: list[str] = []
+        self._evaluator: Evaluator | None = None
+
+    def search(self, evaluator: Evaluator) -> None:
+        """Search all points at once; what is finished is kept whatever happens to the rest."""
+        self._evaluator = evaluator
+        spec = self._scenario.search
+        settings = EvolutionSettings(
+            population=spec.population,
+            generations=spec.generations,
+            mutation=spec.mutation,
+            crossover=spec.crossover,
+            strategy=spec.strategy,
+            seed=self._scenario.seed,
+            tolerance=spec.tolerance,
+        )
+        evaluator.plan(settings.population * (settings.generations + 1), spec.polish)
+
+        def task(index: int) -> Callable[[Callable[[Request], Reply]], PointSearch]:
+            def on_generation(generation: Generation) -> None:
+                evaluator.note_generation(index, generation.index)
+
+            return lambda ask: search_point(self._points[index], settings, spec.polish, ask, on_generation)
+
+        tasks = [task(index) for index in range(len(self._points))]
+        with closing(interleave(tasks, evaluator.serve)) as finished:
+            for index, found in finished:
+                self._found[index] = found
+                evaluator.finish_point(index)
+        if not any(found.result for found in self._found.values()):
+            reason = next(iter(self._found.values())).reason
+            raise StudyError(f"{self._scenario.path}: no simulation succeeded: {reason}")
+
+    def validate(self, runner: Runner) -> None:
+        """Score the held-out recordings with what was found."""
+        results, laws = self._results(), self._laws()[0]
+        space = self._scenario.parameters
+        shared = [p.name for p in space.parameters]
+        jobs: list[Job] = []
+        scored: list[tuple[Case, Recording]] = []
+        for case, recording in self._held_out:
+            temperature = recording.temperature_degC
+            try:
+                values = values_at(temperature, shared, results, laws, self._scenario.round_to)
+            except InputError as error:
+                self._notes.append(f"{recording.name} was not scored: {error}.")
+                continue
+            jobs.append(Job(case.name, space.assignments(values), keep_signals=True))
+            scored.append((case, recording))
+        if not jobs:
+            return
+        for (case, recording), outcome in zip(scored, runner.run(jobs), strict=True):
+            if outcome.signals is None:
+                self._notes.append(f"{recording.name} was not scored: {outcome.reason}")
+                continue
+            comparison = compare(case, recording, "validate", outcome.signals, {})
+            self._comparisons.append(comparison)
+
+    def result(self) -> IdentifyResult:
+        """Everything found so far."""
+        scenario, evaluator = self._scenario, self._evaluator
+        laws, notes = self._laws()
+        comparisons = [*self._fit_comparisons(), *self._comparisons]
+        failed = [
+            f"{self._points[k].label} has no result: {found.reason}"
+            for k, found in sorted(self._found.items())
+            if found.result is None
+        ]
+        return IdentifyResult(
+            title=scenario.title or scenario.path.stem,
+            status="interrupted" if self.interrupted else "complete",
+            seed=scenario.seed,
+            version=__version__,
+            fmu=scenario.fmu.path,
+            fmu_sha256=scenario.fmu.sha256,
+            scenario=scenario.path,
+            points=tuple(self._results()),
+            planned_points=len(self._points),
+            laws=laws,
+            comparisons=tuple(comparisons),
+            errors=summarise(comparisons),
+            evaluations=0 if evaluator is None else sum(evaluator.evaluations),
+            failures={} if evaluator is None else dict(sorted(evaluator.failures.items())),
+            notes=(*failed, *notes, *self._notes),
+            settings={**asdict(scenario.search), "error": scenario.cost.error},
+        )
+
+    def _results(self) -> list[PointResult]:
+        results = []
+        for k, found in sorted(self._found.items()):
+            if found.result is not None:
+                evaluations = 0 if self._evaluator is None else self._evaluator.evaluations[k]
+                results.append(replace(found.result, evaluations=evaluations))
+        return results
+
+    def _laws(self) -> tuple[dict[str, LawResult], list[str]]:
+        return fit_laws(self._results(), self._scenario.laws)
+
+    def _fit_comparisons(self) -> list[Comparison]:
+        comparisons = []
+        for k, found in sorted(self._found.items()):
+            problem, recordings = self._points[k], self._scenario.points[k].fit
+            for case, recording, signals in zip(problem.cases, recordings, found.signals, strict=False):
+                noise = {channel.name: channel.noise for channel in case.channels}
+                comparisons.append(compare(case, recording, "fit", signals, noise))
+        return comparisons
+
+
+def study_identity(scenario: Scenario) -> dict[str, object]:
+    """What makes two runs the same study: digests of scenario, FMU and recordings, and the seed."""
+    content = {
+        "title": scenario.title,
+        "fixed": dict(scenario.fixed),
+        "points": [dict(point.fixed) for point in scenario.points],
+        "parameters": [asdict(p) for p in scenario.parameters.parameters],
+        "laws": {name: asdict(law) for name, law in scenario.laws.items()},
+        "cost": asdict(scenario.cost),
+        "search": asdict(scenario.search),
+        "simulation": {**asdict(scenario.simulation), "deadline": None, "memory_mb": None},
+        "inputs": scenario.inputs,
+        "round_to": scenario.round_to,
+    }
+    text = json.dumps(content, sort_keys=True, default=str)
+    recordings = {
+        "fit": [_digest(recording) for recording in scenario.fit],
+        "validate": [_digest(recording) for recording in scenario.validate],
+    }
+    return {
+        "kind": scenario.kind,
+        "scenario": hashlib.sha256(text.encode()).hexdigest(),
+        "fmu": scenario.fmu.sha256,
+        "recordings": recordings,
+        "seed": scenario.seed,
+    }
+
+
+def _digest(recording: Recording) -> str:
+    """Digest of a recording as it is used: its samples after renaming, conversion and cutting."""
+    digest = hashlib.sha256()
+    signals = recording.signals
+    digest.update(signals.time.tobytes())
+    for name in signals.names:
+        digest.update(name.encode())
+        digest.update(signals[name].tobytes())
+    return digest.hexdigest()
+
+
+def _held_out_cases(scenario: Scenario) -> list[tuple[Case, Recording]]:
+    cases = []
+    for recording in scenario.validate:
+        owner = next((p for p in scenario.points if recording in p.validate), None)
+        fixed = scenario.fixed if owner is None else owner.fixed
+        cases.append((build_case(scenario, recording, fixed), recording))
+    return cases
+
+
+def _open_runner(
+    scenario: Scenario,
+    points: Sequence[PointProblem],
+    held_out: Sequence[tuple[Case, Recording]],
+    workers: int,
+    cluster: str | None,
+) -> Runner:
+    experiments = []
+    for point in points:
+        for case in point.cases:
+            experiments += [terms_experiment(case, point.error), residual_experiment(case)]
+    experiments += [case.experiment(case.name, None) for case, _ in held_out]
+    spec = scenario.simulation
+    if cluster is not None:
+        from thsa_cosim.batch.cluster import ClusterRunner
+
+        return ClusterRunner(experiments, cluster, deadline_s=spec.deadline)
+    return LocalRunner(
+        experiments,
+        workers=workers,
+        deadline_s=spec.deadline,
+        memory_limit_mb=spec.memory_mb,
+        reuse=spec.reuse,
+        kind=spec.interface,
+    )

@@ -1,0 +1,121 @@
+"""Figures of an identification, as PNG files; no global state of matplotlib is touched."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from thsa_cosim.identify.results import Comparison, IdentifyResult, LawResult
+
+MEASURED = "0.55"
+SIMULATED = "#0b62a4"
+PUBLISHED = "#c44e2b"
+RESIDUAL = "#5b8c5a"
+
+
+def file_name(text: str) -> str:
+    """A name that is safe in any file system, from text that comes out of a user's file."""
+    return re.sub(r"[^\w.+-]+", "_", text).strip("._") or "unnamed"
+
+
+def plot_law(law: LawResult, result: IdentifyResult, path: Path) -> None:
+    """Points with 95 % error bars, the fitted law with its band, and the published curve."""
+    figure = Figure(figsize=(7.0, 4.6), layout="constrained")
+    axes = figure.add_subplot()
+    points = [p for p in result.points if p.temperature_degC is not None]
+    t = np.array([p.temperature_degC for p in points], dtype=np.float64)
+    estimates = [p.parameters[law.parameter] for p in points]
+    values = np.array([e.value for e in estimates])
+    errors = np.array([np.nan if e.stderr is None else e.stderr for e in estimates])
+    sure = np.array([e.identifiable for e in estimates], dtype=np.bool_)
+    margin = max(0.05 * float(np.ptp(t)), 1.0)
+    grid = np.linspace(float(t.min()) - margin, float(t.max()) + margin, 300)
+    if law.published is not None:
+        axes.plot(grid, law.published(grid), "--", color=PUBLISHED, lw=1.6, label="published")
+    curve, band = law.law(grid), 1.96 * law.law.stderr(grid)
+    if np.isfinite(band).all():
+        axes.fill_between(grid, curve - band, curve + band, color=SIMULATED, alpha=0.15, lw=0)
+    axes.plot(grid, curve, color=SIMULATED, lw=1.4, label=f"fitted ({law.law.form})")
+    axes.errorbar(
+        t[sure],
+        values[sure],
+        yerr=1.96 * errors[sure],
+        fmt="o",
+        ms=5,
+        capsize=3,
+        color="black",
+        label="identified, 95 %",
+    )
+    if not sure.all():
+        axes.plot(t[~sure], values[~sure], "o", ms=6, mfc="none", color="black", label="not determined")
+    axes.set_xlabel("temperature [°C]")
+    axes.set_ylabel(f"{law.parameter} [{law.unit}]")
+    title = f"{law.parameter} over temperature"
+    if law.deviation is not None:
+        title += f" (largest deviation of the points {100.0 * law.deviation:.2g} %)"
+    axes.set_title(title, fontsize=11)
+    axes.legend(frameon=False)
+    _tidy(axes)
+    _save(figure, path)
+
+
+def plot_comparison(comparison: Comparison, path: Path) -> None:
+    """Measured against simulated for every channel of a recording, each with its residual below."""
+    names = comparison.measured.names
+    figure = Figure(figsize=(10.0, 3.4 * len(names)), layout="constrained")
+    axes = figure.subplots(2 * len(names), 1, sharex=True, height_ratios=[3, 1] * len(names), squeeze=False)
+    time = comparison.measured.time
+    for k, name in enumerate(names):
+        above, below = axes[2 * k, 0], axes[2 * k + 1, 0]
+        unit, error = comparison.measured.units[name], comparison.errors[name]
+        measured, simulated = comparison.measured[name], comparison.simulated[name]
+        above.plot(time, measured, color=MEASURED, lw=0.8, label="measured")
+        above.plot(time, simulated, color=SIMULATED, lw=1.0, label="simulated")
+        above.set_ylabel(f"{name} [{unit}]")
+        above.set_title(
+            f"{name}: rmse {error.rmse:.3g} {unit}, {100.0 * error.nrmse:.2g} % of range,"
+            f" noise {error.noise:.3g} {unit}",
+            fontsize=10,
+            loc="left",
+        )
+        above.legend(frameon=False, loc="upper right", ncols=2, fontsize=9)
+        below.plot(time, simulated - measured, color=RESIDUAL, lw=0.6)
+        below.axhline(0.0, color="black", lw=0.6)
+        below.set_ylabel(f"error [{unit}]")
+        _tidy(above)
+        _tidy(below)
+    axes[-1, 0].set_xlabel("time [s]")
+    figure.suptitle(comparison.recording, fontsize=12)
+    _save(figure, path)
+
+
+def plot_convergence(result: IdentifyResult, path: Path) -> None:
+    """Best cost per sample against generation, one line per point."""
+    figure = Figure(figsize=(7.0, 4.6), layout="constrained")
+    axes = figure.add_subplot()
+    for point in result.points:
+        scale = point.cost_per_sample / point.cost if point.cost else 1.0
+        cost = [generation.best_cost * scale for generation in point.generations]
+        axes.plot(range(len(cost)), cost, marker=".", lw=1.0, label=point.label)
+    axes.set_yscale("log")
+    axes.set_xlabel("generation [1]")
+    axes.set_ylabel("best cost per sample [1] (1: noise)")
+    axes.legend(frameon=False, fontsize=9)
+    _tidy(axes)
+    _save(figure, path)
+
+
+def _tidy(axes: Axes) -> None:
+    axes.grid(True, color="0.9", lw=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def _save(figure: Figure, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    FigureCanvasAgg(figure)
+    figure.savefig(path, dpi=130, format="png")

@@ -1,0 +1,97 @@
+"""How far a study is, while it runs: a bar on a terminal, now and then a plain line elsewhere."""
+
+import time
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, TaskID, TextColumn
+from rich.progress import Progress as Bar
+
+from thsa_cosim.identify.results import Progress
+
+#: Seconds between two plain lines.
+LINE_EVERY = 10.0
+#: Seconds between two updates of the bar.
+BAR_EVERY = 0.1
+
+
+class ProgressDisplay:
+    """A context manager that is called with every ``Progress``; ``quiet`` shows nothing at all."""
+
+    def __init__(self, console: Console, *, quiet: bool = False) -> None:
+        self._console = console
+        self._quiet = quiet
+        self._bar: Bar | None = None
+        self._task: TaskID | None = None
+        self._begin = time.monotonic()
+        self._shown = self._begin
+        self._last: Progress | None = None
+
+    def __enter__(self) -> Self:
+        if not self._quiet and self._console.is_terminal:
+            self._bar = Bar(
+                TextColumn("{task.description}"),
+                BarColumn(bar_width=24),
+                TextColumn("{task.fields[state]}"),
+                console=self._console,
+                transient=True,
+            )
+            self._bar.start()
+            self._task = self._bar.add_task("starting", total=None, state="")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+        elif not self._quiet and self._last is not None:
+            self._line(self._last)
+
+    def __call__(self, progress: Progress) -> None:
+        """Show ``progress``, unless something was shown a moment ago."""
+        self._last = progress
+        now = time.monotonic()
+        if self._quiet or now - self._shown < (LINE_EVERY if self._bar is None else BAR_EVERY):
+            return
+        self._shown = now
+        if self._bar is None:
+            self._line(progress)
+        elif self._task is not None:
+            self._bar.update(
+                self._task,
+                description=progress.stage,
+                completed=progress.runs,
+                total=progress.planned,
+                state=self._state(progress),
+            )
+
+    def _line(self, progress: Progress) -> None:
+        text = f"{progress.stage}: {self._state(progress)}"
+        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+    def _state(self, progress: Progress) -> str:
+        elapsed = max(time.monotonic() - self._begin, 1e-3)
+        rate = (progress.runs - progress.reused) / elapsed
+        parts = [f"{progress.runs}/{progress.planned} runs"]
+        if progress.reused:
+            parts.append(f"{progress.reused} from the journal")
+        if rate > 0.0:
+            parts.append(f"{rate:.0f} runs/s" if rate >= 1.0 else f"{60.0 * rate:.1f} runs/min")
+            left = max(progress.planned - progress.runs, 0) / rate
+            parts.append(f"{duration(left)} left")
+        if progress.best:
+            parts.append(f"best cost {min(progress.best.values()):.3g} to {max(progress.best.values()):.3g}")
+        parts.append(f"{progress.failures} failed")
+        return ", ".join(parts)
+
+
+def duration(seconds: float) -> str:
+    """A short time such as ``42 s``, ``3 min 20 s`` or ``2 h 5 min``."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -1,0 +1,49 @@
+"""All files of an identification in its study folder."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from thsa_cosim.identify.results import IdentifyResult
+from thsa_cosim.report.plots import file_name, plot_comparison, plot_convergence, plot_law
+from thsa_cosim.report.result_json import (
+    identify_to_dict,
+    write_json,
+    write_laws_csv,
+    write_parameters_csv,
+)
+
+RESULT = "result.json"
+
+
+def write_identify(
+    result: IdentifyResult, folder: Path, on_file: Callable[[Path], None] | None = None
+) -> list[Path]:
+    """Write result.json, parameters.csv, laws.csv and the plots; return what was written, in order."""
+    written: list[Path] = []
+
+    def note(path: Path) -> None:
+        written.append(path)
+        if on_file is not None:
+            on_file(path)
+
+    write_json(folder / RESULT, identify_to_dict(result))
+    note(folder / RESULT)
+    if not result.points:
+        return written
+    write_parameters_csv(folder / "parameters.csv", result)
+    note(folder / "parameters.csv")
+    if result.laws:
+        write_laws_csv(folder / "laws.csv", result)
+        note(folder / "laws.csv")
+    plots = folder / "plots"
+    for law in result.laws.values():
+        path = plots / f"law_{file_name(law.parameter)}.png"
+        plot_law(law, result, path)
+        note(path)
+    for comparison in result.comparisons:
+        path = plots / f"{comparison.role}_{file_name(comparison.recording)}.png"
+        plot_comparison(comparison, path)
+        note(path)
+    plot_convergence(result, plots / "convergence.png")
+    note(plots / "convergence.png")
+    return written

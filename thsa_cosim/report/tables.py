@@ -1,0 +1,100 @@
+"""What the command line prints at the end of an identification (rich)."""
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from thsa_cosim.identify.results import ChannelError, IdentifyResult
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number for a table; a dash where there is none."""
+    return "–" if value is None or value != value else f"{value:.{digits}g}"
+
+
+def print_identify(console: Console, result: IdentifyResult) -> None:
+    """Print laws, points and errors of an identification."""
+    if result.laws:
+        console.print(laws_table(result))
+    console.print(points_table(result))
+    if any(result.errors.values()):
+        console.print(errors_table(result))
+    for note in result.notes:
+        console.print(Text(f"note: {note}"), highlight=False)
+
+
+def laws_table(result: IdentifyResult) -> Table:
+    """Identified laws beside the published ones."""
+    table = Table(title="Laws over temperature (t in °C)", title_justify="left")
+    for heading in ("parameter", "unit", "form", "identified", "published"):
+        table.add_column(heading, overflow="fold")
+    table.add_column("largest deviation\nof the points", justify="right")
+    table.add_column("of the law", justify="right")
+    for name, law in result.laws.items():
+        published = law.published
+        table.add_row(
+            Text(name),
+            Text(law.unit),
+            law.law.form + (" (chosen)" if law.selected else ""),
+            ", ".join(number(c, 3) for c in law.law.coefficients),
+            "–" if published is None else ", ".join(number(c, 3) for c in published.coefficients),
+            _percent(law.deviation),
+            _percent(law.law_deviation),
+        )
+    return table
+
+
+def points_table(result: IdentifyResult) -> Table:
+    """Every parameter at every point with its standard error; values in brackets are not determined."""
+    names = list(result.points[0].parameters) if result.points else []
+    table = Table(title="Identified values ± one standard error", title_justify="left")
+    table.add_column("point")
+    for name in names:
+        unit = result.points[0].parameters[name].unit
+        table.add_column(Text(f"{name} [{unit}]"), justify="right")
+    table.add_column("cost per sample", justify="right")
+    for point in result.points:
+        cells = []
+        for name in names:
+            estimate = point.parameters[name]
+            text = f"{number(estimate.value)} ± {number(estimate.stderr, 2)}"
+            cells.append(text if estimate.identifiable else f"({text})")
+        table.add_row(Text(point.label), *cells, number(point.cost_per_sample))
+    reasons = {
+        f"{name} at {point.label}: {estimate.reason}"
+        for point in result.points
+        for name, estimate in point.parameters.items()
+        if not estimate.identifiable
+    }
+    if reasons:
+        table.caption = "In brackets: not determined by these data.\n" + "\n".join(sorted(reasons))
+        table.caption_justify = "left"
+    return table
+
+
+def errors_table(result: IdentifyResult) -> Table:
+    """Rmse against noise per channel, for the fitted and the held-out recordings."""
+    table = Table(title="Simulated against measured", title_justify="left")
+    for heading in ("recordings", "signal"):
+        table.add_column(heading)
+    for heading in ("rmse", "noise", "rmse / noise", "rmse / range"):
+        table.add_column(heading, justify="right")
+    for role, channels in result.errors.items():
+        for name, error in channels.items():
+            table.add_row(role, Text(name), *_error_cells(error))
+    return table
+
+
+def _error_cells(error: ChannelError) -> tuple[str, str, str, str]:
+    unit = f" {error.unit}"
+    ratio = error.rmse / error.noise if error.noise > 0.0 else None
+    return (
+        number(error.rmse, 3) + unit,
+        number(error.noise, 3) + unit,
+        number(ratio, 3),
+        _percent(error.nrmse),
+    )
+
+
+def _percent(value: float | None) -> str:
+    return "–" if value is None or value != value else f"{100.0 * value:.2g} %"

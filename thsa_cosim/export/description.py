@@ -38,7 +38,11 @@ FMI3_COMMON = {
     "providesDirectionalDerivatives": "true",
     "providesAdjointDerivatives": "true",
 }
-FMI3_CO_SIMULATION = {"canHandleVariableCommunicationStepSize": "true", "maxOutputDerivativeOrder": "1"}
+FMI3_CO_SIMULATION = {
+    "canHandleVariableCommunicationStepSize": "true",
+    "maxOutputDerivativeOrder": "1",
+    "providesIntermediateUpdate": "true",
+}
 
 
 def fmi2_description(
@@ -137,6 +141,8 @@ def fmi3_description(model: CausalModel, identifier: str, token: str, date: str)
             attributes["unit"] = variable.unit
         if variable.name.startswith("der("):
             attributes["derivative"] = reference[model.states[variable.index]]
+        if variable.causality == "input":
+            attributes["intermediateUpdate"] = "true"
         primary[attributes["valueReference"]] = ET.SubElement(entries, "Float64", attributes)
     first = first_value_references(model)["indicator"]
     for index in range(model.g.numel()):

@@ -18,7 +18,8 @@ def read(path: Path, choose: Choose) -> dict[str, RawColumn]:
         from nptdms import TdmsFile
     except ImportError:
         raise MissingExtraError("reading TDMS", "tdms") from None
-    with TdmsFile.open(path) as file:
+    # Opened here, because npTDMS leaves the file open when it gives up.
+    with path.open("rb") as stream, TdmsFile.open(stream) as file:
         channels = {f"{g.name}/{c.name}": c for g in file.groups() for c in g.channels()}
         return {name: _column(channels[name]) for name in choose(list(channels))}
 

@@ -16,7 +16,7 @@
 
 #if N_X > 0
 
-enum { MOST_STEPS = 2000000, MOST_RAPID = 60 };
+enum { MOST_STEPS = 2000000, MOST_RAPID = 60, MOST_REDONE = 60 };
 
 typedef struct {
     double disagreement[N_G + 1]; /* s*g - dead band, s = +1 where m = 0 and -1 where m = 1; > 0 = disagrees */
@@ -186,16 +186,14 @@ Status solver_advance(Instance *c, double end) {
             }
             error = solver_step(c, h);
             if (error >= 0.0 && error <= 1.0) {
-                if (!N_G || landing) break;
-                if (rapid > MOST_RAPID) break;
+                if (!N_G || rapid > MOST_RAPID) break;
                 const double theta = find_event(c, h, &start, &finish, g, grain);
                 if (theta == 0.0) break;
-                if (theta >= 1.0) {
-                    landing = 1;
-                    break;
-                }
-                if (theta > 0.0) {
-                    landing = 1;
+                if (theta > 0.0) { /* redo to land there, until the shorter step agrees about where it is */
+                    const double short_of_end = (1.0 - theta) * h;
+                    landing++;
+                    if (theta >= 1.0 || landing > MOST_REDONE) break;
+                    if (landing > 1 && (short_of_end < 1e-3 * h || short_of_end <= 4.0 * grain)) break;
                     h = fmax(theta * h, grain);
                     continue;
                 }
@@ -219,11 +217,14 @@ Status solver_advance(Instance *c, double end) {
             start = finish;
             continue;
         }
-        if (now->time - last_event > fmax(1e-6 * now->step, 4.0 * blind)) rapid = 0, blind = 0.0;
-        last_event = now->time;
-        if (++rapid == MOST_RAPID)
-            instance_log(c, WARNING, LOG_WARNING, "burst of events at time %.15g is crossed blindly", now->time);
+        const long events = c->events;
         if (instance_update_modes(c) != OK) return DISCARD;
+        if (c->events != events) {
+            if (now->time - last_event > fmax(1e-6 * now->step, 4.0 * blind)) rapid = 0, blind = 0.0;
+            last_event = now->time;
+            if (++rapid == MOST_RAPID)
+                instance_log(c, WARNING, LOG_WARNING, "burst of events at time %.15g is crossed blindly", now->time);
+        }
         if (instance_indicators(c) != OK || judge(c, c->g, &start))
             return give_up(c, "event indicators cannot be computed");
     }

@@ -200,13 +200,13 @@ def test_study_folder(tmp_path: Path) -> None:
     assert open_study(folder, IDENTITY) is False
     assert open_study(folder, IDENTITY) is True
     for key, value, words in [
-        ("seed", 2, "another seed"),
-        ("fmu", "x", "another FMU"),
-        ("scenario", "x", "another scenario"),
-        ("recordings", {"fit": ["d"]}, "other recordings"),
+        ("seed", 2, "a study with another seed"),
+        ("fmu", "x", "a study of another FMU"),
+        ("scenario", "x", "a study of another scenario"),
+        ("recordings", {"fit": ["d"]}, "a study of other recordings"),
         ("kind", "tune", "another kind of study"),
     ]:
-        with pytest.raises(InputError, match=f"holds a study of {words}; choose another folder with -o"):
+        with pytest.raises(InputError, match=f"holds {words}; choose another folder with -o"):
             open_study(folder, {**IDENTITY, key: value})
 
 

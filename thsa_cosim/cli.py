@@ -159,6 +159,40 @@ def identify(
         )
 
 
+@cli.command()
+@click.argument("scenario", type=PATH)
+@_study_options
+def simulate(
+    scenario: Path,
+    fit: tuple[Path, ...],
+    validate: tuple[Path, ...],
+    output: Path | None,
+    seed: int | None,
+    fmu: Path | None,
+    workers: int | None,
+    cluster: str | None,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Run SCENARIO once per recording and compare; parameters to be identified keep their start values."""
+    from thsa_cosim.identify import open_study, study_identity
+    from thsa_cosim.report.tables import print_simulate
+    from thsa_cosim.scenario import load_scenario
+    from thsa_cosim.simulate import RESULT
+    from thsa_cosim.simulate import simulate as run
+
+    loaded = load_scenario(scenario, fit=fit, validate=validate, seed=seed, fmu=fmu)
+    folder = output or default_folder(scenario, "" if loaded.kind == "simulate" else "-simulate")
+    open_study(folder, {**study_identity(loaded), "kind": "simulate"})
+    result = run(loaded, folder=folder, workers=workers or cores(), cluster=cluster)
+    if as_json:
+        click.echo((folder / RESULT).read_text(encoding="utf-8"), nl=False)
+    elif not quiet:
+        console = _console()
+        print_simulate(console, result)
+        console.print(f"\n{len(result.files)} files in {folder}", soft_wrap=True)
+
+
 class _Interrupted(Exception):
     """A study was interrupted and has written what it has."""
 
@@ -170,9 +204,9 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def default_folder(scenario: Path) -> Path:
+def default_folder(scenario: Path, suffix: str = "") -> Path:
     """``studies/<scenario>-<date>``: the same command on the same day continues the same study."""
-    return Path("studies") / f"{scenario.stem}-{datetime.date.today().isoformat()}"
+    return Path("studies") / f"{scenario.stem}{suffix}-{datetime.date.today().isoformat()}"
 
 
 def _continue_command(command: str, scenario: Path, folder: Path) -> str:

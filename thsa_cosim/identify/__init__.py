@@ -20,7 +20,8 @@ from thsa_cosim.identify.results import (
     PointResult,
     Progress,
 )
-from thsa_cosim.identify.run import identify
+from thsa_cosim.identify.run import identify, study_identity
+from thsa_cosim.identify.study import open_study
 
 __all__ = [
     "ChannelError",
@@ -31,4 +32,6 @@ __all__ = [
     "PointResult",
     "Progress",
     "identify",
+    "open_study",
+    "study_identity",
 ]

@@ -1,6 +1,6 @@
 """Simulated against measured: per recording and channel, and over all recordings of a role."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,14 +11,10 @@ from thsa_cosim.recordings import Recording
 from thsa_cosim.signals import Signals
 
 
-def compare(
-    case: Case, recording: Recording, role: str, simulated: Signals, noise: Mapping[str, float]
-) -> Comparison:
-    """Errors of every measured signal of a recording over all of its samples.
-
-    ``noise``: 1 σ per fitted channel in the FMU's unit; for the others the recording's own estimate counts.
-    """
+def compare(case: Case, recording: Recording, role: str, simulated: Signals) -> Comparison:
+    """Errors of every measured signal over all samples; a signal that is not fitted has its estimated noise."""
     measured = case.measured
+    noise = {channel.name: channel.noise for channel in case.channels}
     on_samples = simulated.select(measured.names).resample(measured.time)
     errors = {
         name: ChannelError(

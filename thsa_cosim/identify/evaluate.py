@@ -20,6 +20,8 @@ from thsa_cosim.signals import FloatArray, Signals
 
 #: Seconds between two writes to the journal: what a power cut may cost.
 WRITE_EVERY = 1.0
+#: More reasons for failures than this are summed up by status.
+MANY_REASONS = 20
 
 
 class Want(Enum):
@@ -53,16 +55,16 @@ class Reply:
 
 def terms_experiment(case: Case, error: str) -> Experiment:
     """The simulation of a recording that returns its cost terms."""
-    return case.experiment(case.name, TermsReducer(case.channels, error))
+    return case.experiment(_name(case, Want.TERMS), TermsReducer(case.channels, error))
 
 
 def residual_experiment(case: Case) -> Experiment:
     """The simulation of a recording that returns its residuals (or, if asked, its signals)."""
-    return case.experiment(_residual_name(case), ResidualReducer(case.channels))
+    return case.experiment(_name(case, Want.RESIDUALS), ResidualReducer(case.channels))
 
 
-def _residual_name(case: Case) -> str:
-    return f"{case.name} (residuals)"
+def _name(case: Case, want: Want) -> str:
+    return f"fit/{case.name}" if want is Want.TERMS else f"fit/{case.name} (residuals)"
 
 
 @dataclass
@@ -88,7 +90,7 @@ class Evaluator:
         channels: Sequence[str],
         on_progress: Callable[[Progress], None] | None = None,
     ) -> None:
-        self.failures: Counter[str] = Counter()
+        self._failed: Counter[tuple[str, str]] = Counter()
         self.evaluations: list[int] = [0] * len(points)
         self.reused = 0
         self.runs = 0
@@ -118,9 +120,9 @@ class Evaluator:
                     continue
                 vector = _Vector(k, row, named, len(point.cases), [None] * len(point.cases))
                 for c, case in enumerate(point.cases):
-                    name = case.name if request.want is Want.TERMS else _residual_name(case)
                     assigned = point.space.assignments(named, case.name)
-                    jobs.append(Job(name, assigned, keep_signals=request.want is Want.SIGNALS))
+                    keep = request.want is Want.SIGNALS
+                    jobs.append(Job(_name(case, request.want), assigned, keep_signals=keep))
                     owners.append((vector, c, position))
         self._run(jobs, owners, requests, replies)
         return [reply.freeze() for reply in replies]
@@ -143,10 +145,23 @@ class Evaluator:
         self._share[k] = self._spent[k]
         self.report()
 
+    @property
+    def failures(self) -> dict[str, int]:
+        """Failed evaluations by reason; by status alone where reasons are too many to read."""
+        if len(self._failed) <= MANY_REASONS:
+            return dict(sorted(self._by(lambda status, reason: reason or status).items()))
+        return dict(sorted(self._by(lambda status, reason: status).items()))
+
+    def _by(self, key: Callable[[str, str], str]) -> Counter[str]:
+        total: Counter[str] = Counter()
+        for (status, reason), count in self._failed.items():
+            total[key(status, reason)] += count
+        return total
+
     def report(self) -> None:
         """Tell how far the study is."""
         if self._on_progress is not None:
-            failed = sum(self.failures.values())
+            failed = sum(self._failed.values())
             stage = "searching"
             self._on_progress(
                 Progress(
@@ -161,7 +176,7 @@ class Evaluator:
         reply.terms[row] = known.terms if known.status == Status.OK else np.inf
         reply.reasons[row] = "" if known.status == Status.OK else known.reason
         if known.status != Status.OK:
-            self.failures[known.reason] += 1
+            self._failed[str(known.status), known.reason] += 1
         else:
             self._note_best(k, float(np.sum(known.terms)))
         runs = len(self._points[k].cases)
@@ -224,7 +239,7 @@ class Evaluator:
                 reply.signals[row] = tuple(o.signals for o in outcomes if o.signals is not None)
         else:
             reply.reasons[row] = failed.reason
-            self.failures[failed.reason] += 1
+            self._failed[str(failed.status), failed.reason] += 1
         terms = reply.terms[row]
         return JournalRow(
             stage=self._points[vector.point].label,

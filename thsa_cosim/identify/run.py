@@ -125,7 +125,7 @@ class _Study:
             except InputError as error:
                 self._notes.append(f"{recording.name} was not scored: {error}.")
                 continue
-            jobs.append(Job(case.name, space.assignments(values), keep_signals=True))
+            jobs.append(Job(f"validate/{case.name}", space.assignments(values), keep_signals=True))
             scored.append((case, recording))
         if not jobs:
             return
@@ -133,8 +133,7 @@ class _Study:
             if outcome.signals is None:
                 self._notes.append(f"{recording.name} was not scored: {outcome.reason}")
                 continue
-            comparison = compare(case, recording, "validate", outcome.signals, {})
-            self._comparisons.append(comparison)
+            self._comparisons.append(compare(case, recording, "validate", outcome.signals))
 
     def result(self) -> IdentifyResult:
         """Everything found so far."""
@@ -160,7 +159,7 @@ class _Study:
             comparisons=tuple(comparisons),
             errors=summarise(comparisons),
             evaluations=0 if evaluator is None else sum(evaluator.evaluations),
-            failures={} if evaluator is None else dict(sorted(evaluator.failures.items())),
+            failures={} if evaluator is None else evaluator.failures,
             notes=(*failed, *notes, *self._notes),
             settings={**asdict(scenario.search), "error": scenario.cost.error},
         )
@@ -181,8 +180,7 @@ class _Study:
         for k, found in sorted(self._found.items()):
             problem, recordings = self._points[k], self._scenario.points[k].fit
             for case, recording, signals in zip(problem.cases, recordings, found.signals, strict=False):
-                noise = {channel.name: channel.noise for channel in case.channels}
-                comparisons.append(compare(case, recording, "fit", signals, noise))
+                comparisons.append(compare(case, recording, "fit", signals))
         return comparisons
 
 
@@ -245,12 +243,19 @@ def _open_runner(
     for point in points:
         for case in point.cases:
             experiments += [terms_experiment(case, point.error), residual_experiment(case)]
-    experiments += [case.experiment(case.name, None) for case, _ in held_out]
+    experiments += [case.experiment(f"validate/{case.name}", None) for case, _ in held_out]
     spec = scenario.simulation
     if cluster is not None:
         from thsa_cosim.batch.cluster import ClusterRunner
 
-        return ClusterRunner(experiments, cluster, deadline_s=spec.deadline)
+        return ClusterRunner(
+            experiments,
+            cluster,
+            deadline_s=spec.deadline,
+            memory_limit_mb=spec.memory_mb,
+            reuse=spec.reuse,
+            kind=spec.interface,
+        )
     return LocalRunner(
         experiments,
         workers=workers,

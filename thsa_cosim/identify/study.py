@@ -10,10 +10,10 @@ MARKER = "study.json"
 
 _WORDS = {
     "kind": "another kind of study",
-    "scenario": "another scenario",
-    "fmu": "another FMU",
-    "recordings": "other recordings",
-    "seed": "another seed",
+    "scenario": "a study of another scenario",
+    "fmu": "a study of another FMU",
+    "recordings": "a study of other recordings",
+    "seed": "a study with another seed",
 }
 
 
@@ -51,8 +51,8 @@ def _check(folder: Path, marker: Path, wanted: Mapping[str, object]) -> bool:
         raise InputError(f"{marker} is damaged; choose another study folder with -o.")
     for key, value in wanted.items():
         if found.get(key) != value:
-            what = _WORDS.get(key, f"another {key}")
+            what = _WORDS.get(key, f"a study with another {key}")
             raise InputError(
-                f"{folder} holds a study of {what}; choose another folder with -o, or repeat that study's command."
+                f"{folder} holds {what}; choose another folder with -o, or repeat that study's command."
             )
     return True

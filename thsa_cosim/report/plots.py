@@ -81,10 +81,10 @@ def plot_comparison(comparison: Comparison, path: Path) -> None:
             fontsize=10,
             loc="left",
         )
-        above.legend(frameon=False, loc="upper right", ncols=2, fontsize=9)
+        above.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, fontsize=9)
         below.plot(time, simulated - measured, color=RESIDUAL, lw=0.6)
         below.axhline(0.0, color="black", lw=0.6)
-        below.set_ylabel(f"error [{unit}]")
+        below.set_ylabel(f"error\n[{unit}]")
         _tidy(above)
         _tidy(below)
     axes[-1, 0].set_xlabel("time [s]")

@@ -5,6 +5,7 @@ from rich.table import Table
 from rich.text import Text
 
 from thsa_cosim.identify.results import ChannelError, IdentifyResult
+from thsa_cosim.simulate import ChannelFit, SimulateResult
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -85,7 +86,23 @@ def errors_table(result: IdentifyResult) -> Table:
     return table
 
 
-def _error_cells(error: ChannelError) -> tuple[str, str, str, str]:
+def print_simulate(console: Console, result: SimulateResult) -> None:
+    """Print how well each recording is met, and why any of them could not be simulated."""
+    table = Table(title="Simulated against measured", title_justify="left")
+    for heading in ("recording", "signal"):
+        table.add_column(heading)
+    for heading in ("rmse", "noise", "rmse / noise", "rmse / range"):
+        table.add_column(heading, justify="right")
+    for recording in result.recordings:
+        for name, error in recording.errors.items():
+            table.add_row(Text(recording.name), Text(name), *_error_cells(error))
+    console.print(table)
+    for recording in result.recordings:
+        if recording.simulated is None:
+            console.print(Text(f"{recording.name} failed: {recording.reason}"), highlight=False)
+
+
+def _error_cells(error: ChannelError | ChannelFit) -> tuple[str, str, str, str]:
     unit = f" {error.unit}"
     ratio = error.rmse / error.noise if error.noise > 0.0 else None
     return (

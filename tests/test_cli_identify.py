@@ -192,7 +192,9 @@ def test_without_current_nor_speed_the_friction_is_not_determined(tmp_path: Path
 
 
 def test_a_model_that_never_runs_is_exit_code_3(tmp_path: Path) -> None:
-    scenario = small_scenario(tmp_path, ("p25",), **{"deadline = 60.0": "deadline = 1e-9"})
+    scenario = small_scenario(
+        tmp_path, ("p25",), **{"deadline = 60.0": "deadline = 1e-9", "population = 45": "population = 5"}
+    )
     done = run("identify", scenario, "-o", tmp_path / "study")
     assert done.returncode == 3
     assert done.stderr.strip().splitlines()[-1].startswith("error: ")

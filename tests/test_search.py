@@ -101,6 +101,13 @@ def test_proposals_stay_in_the_cube_and_a_start_takes_part() -> None:
     assert result.cost == 0.0
 
 
+def test_the_initial_population_is_a_latin_hypercube() -> None:
+    first = []
+    evolve(lambda v: (first.append(v.copy()), bowl(v))[1], 3, EvolutionSettings(generations=1))
+    for column in first[0].T:
+        assert sorted(np.floor(column * 45).astype(int)) == list(range(45))
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_failed_vectors_never_win(bad: float) -> None:
     def evaluate(vectors: np.ndarray) -> np.ndarray:

@@ -11,7 +11,6 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
 from thsa_cosim.errors import InputError, did_you_mean
@@ -176,6 +175,8 @@ def _aicc(chi2: float, n: int, k: int, known: bool) -> float:
 
 
 def _spline(knots: Sequence[float], values: Sequence[float], t: FloatArray) -> FloatArray:
+    from scipy.interpolate import CubicSpline  # a rare form, and slow to import
+
     return np.asarray(CubicSpline(knots, values, bc_type="natural")(t), dtype=np.float64)
 
 

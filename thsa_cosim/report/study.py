@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from thsa_cosim.identify.results import IdentifyResult
-from thsa_cosim.report.plots import file_name, plot_comparison, plot_convergence, plot_law
 from thsa_cosim.report.result_json import (
     identify_to_dict,
     write_json,
@@ -19,6 +18,9 @@ def write_identify(
     result: IdentifyResult, folder: Path, on_file: Callable[[Path], None] | None = None
 ) -> list[Path]:
     """Write result.json, parameters.csv, laws.csv and the plots; return what was written, in order."""
+    # matplotlib takes half a second to import: not before the study has run.
+    from thsa_cosim.report.plots import file_name, plot_comparison, plot_convergence, plot_law
+
     written: list[Path] = []
 
     def note(path: Path) -> None:

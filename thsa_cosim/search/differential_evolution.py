@@ -12,7 +12,6 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, OptimizeResult, differential_evolution
-from scipy.stats import qmc
 
 from thsa_cosim.search.strategies import Strategy
 
@@ -73,8 +72,10 @@ class EvolutionResult:
 
 def initial_population(dimension: int, settings: EvolutionSettings, start: FloatArray | None) -> FloatArray:
     """Latin hypercube of (S, n) in [0, 1]; ``start`` (n,), if any, takes the place of the first vector."""
-    sampler = qmc.LatinHypercube(d=dimension, rng=np.random.default_rng(settings.seed))
-    population = np.asarray(sampler.random(settings.population), dtype=np.float64)
+    # McKay, Beckman and Conover (1979): one vector in each of S slices of every direction.
+    rng = np.random.default_rng(settings.seed)
+    slices = np.stack([rng.permutation(settings.population) for _ in range(dimension)], axis=1)
+    population = (slices + rng.random(slices.shape)) / settings.population
     if start is not None:
         population[0] = np.clip(start, 0.0, 1.0)
     return population

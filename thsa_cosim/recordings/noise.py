@@ -40,6 +40,9 @@ def noise_estimate(values: FloatArray) -> float:
     """
     if values.size < 16:
         return 0.0
+    largest = float(np.max(np.abs(values)))
+    if not np.isfinite(largest) or largest > 1e150:
+        return 0.0
     difference = np.diff(values, 2) / np.sqrt(6.0)
     spread = float(np.median(np.abs(difference))) / 0.67449
     if spread == 0.0:
@@ -47,7 +50,7 @@ def noise_estimate(values: FloatArray) -> float:
         return float(quantum(values) / np.sqrt(12.0))
     for _ in range(20):
         inner = difference[np.abs(difference) <= _CLIP * spread]
-        refined = float(np.sqrt(np.mean(inner**2))) / _CLIPPED_SHARE
+        refined = spread * float(np.sqrt(np.mean((inner / spread) ** 2))) / _CLIPPED_SHARE
         if abs(refined - spread) <= 1e-6 * spread or refined == 0.0:
             break
         spread = refined

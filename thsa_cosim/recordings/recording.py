@@ -10,10 +10,11 @@ from typing import Literal
 import numpy as np
 
 from thsa_cosim.errors import RecordingError, ThsaCosimError, UnitError, did_you_mean
+from thsa_cosim.recordings.axis import TimeAxis, check_finite, common_grid, source_unit, times
 from thsa_cosim.recordings.noise import noise_estimate
 from thsa_cosim.recordings.table import Choose, RawColumn, resolve
 from thsa_cosim.signals import FloatArray, Signals
-from thsa_cosim.units import conversion, convert
+from thsa_cosim.units import convert
 
 SUFFIXES: Mapping[str, str] = {
     **dict.fromkeys((".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm"), "csv"),
@@ -56,22 +57,6 @@ class Column:
     shift: float = 0.0
     smooth: Literal["none", "mean"] = "none"
     interpolation: Literal["linear", "hold"] = "linear"
-
-
-@dataclass(frozen=True)
-class TimeAxis:
-    """How time is read, cut and resampled.
-
-    ``column`` None takes the file's own time axis (TDMS waveforms, MF4). ``start`` and ``stop`` [s] cut in the
-    file's time; the first kept sample becomes time 0 if ``from_zero``. ``step`` [s] resamples linearly.
-    """
-
-    column: str | None = None
-    unit: str | None = None
-    start: float | None = None
-    stop: float | None = None
-    step: float | None = None
-    from_zero: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,8 +127,8 @@ def read_recording(
         sources[_TEMPERATURE] = temperature
     raw, sha256 = _load_chosen(path, sources, axis)
     targets: dict[str, str | None] = {**(units or {}), _TEMPERATURE: "degC"}
-    own = {s.column: _times(path, s.column, raw, axis) for s in sources.values() if s.column is not None}
-    grid = _grid(path, own, axis)
+    own = {s.column: times(path, s.column, raw, axis) for s in sources.values() if s.column is not None}
+    grid = common_grid(path, own, axis)
     values: dict[str, FloatArray] = {}
     noise: dict[str, float] = {}
     for signal, source in sources.items():
@@ -156,9 +141,11 @@ def read_recording(
             continue
         column, t = raw[source.column], own[source.column]
         kept = (t >= grid[0]) & (t <= grid[-1])
-        _check_finite(path, source.column, column.values, t, kept)
-        numbers = source.scale * column.values + source.offset
-        numbers = _to_unit(path, signal, source, column.unit, targets.get(signal), numbers)
+        check_finite(path, source.column, column.values, t, kept)
+        with np.errstate(over="ignore", invalid="ignore"):
+            numbers = source.scale * column.values + source.offset
+            numbers = _to_unit(path, signal, source, column.unit, targets.get(signal), numbers)
+        check_finite(path, source.column, numbers, t, kept)
         noise[signal] = noise_estimate(numbers[kept])
         if source.smooth == "mean":
             values[signal] = np.full(grid.shape, float(np.mean(numbers[kept])))
@@ -233,112 +220,6 @@ def _neighbours(path: Path) -> list[str]:
         return []
 
 
-def _times(path: Path, asked: str, raw: Mapping[str, RawColumn], axis: TimeAxis) -> FloatArray:
-    """Return the (n,) times [s] of column ``asked``: finite and increasing."""
-    column = raw[asked]
-    if axis.column is None:
-        if column.time is None:
-            raise RecordingError(
-                f"{path}: column {asked!r} has no time of its own; name the time column (recordings.time.column)."
-            )
-        times, unit, label = column.time, "s", f"time of {asked!r}"
-    else:
-        raw_time = raw[axis.column]
-        label = f"time column {axis.column!r}"
-        unit = _source_unit(path, axis.column, axis.unit, raw_time.unit, "recordings.time")
-        times = raw_time.values
-        if times.size != column.values.size:
-            raise RecordingError(
-                f"{path}: column {asked!r} has {column.values.size} samples, but {label} has {times.size};"
-                f" leave recordings.time.column out to use each channel's own time."
-            )
-    try:
-        seconds = convert(times, unit, "s")
-    except UnitError as error:
-        raise UnitError(f"{path}: {label}: {error}") from None
-    if seconds.size < 2:
-        raise RecordingError(f"{path}: holds {seconds.size} samples of {asked!r}; at least 2 are needed.")
-    bad = np.flatnonzero(~np.isfinite(seconds))
-    if bad.size:
-        raise RecordingError(f"{path}: {label} is {seconds[bad[0]]} at sample {bad[0] + 1}; remove the row.")
-    back = np.flatnonzero(np.diff(seconds) <= 0)
-    if back.size:
-        k = int(back[0])
-        raise RecordingError(
-            f"{path}: {label} does not increase at sample {k + 2} ({seconds[k + 1]:g} s after {seconds[k]:g} s);"
-            f" sort the rows and drop repeated ones."
-        )
-    return seconds
-
-
-def _grid(path: Path, own: Mapping[str, FloatArray], axis: TimeAxis) -> FloatArray:
-    """Return the common time axis [s]: the finest one, over the span that all columns share, cut and resampled."""
-    if not own:
-        raise RecordingError(f"{path}: no column is read from it; name at least one.")
-    finest = max(own.values(), key=lambda t: t.size / (t[-1] - t[0]))
-    low = max(float(t[0]) for t in own.values())
-    high = min(float(t[-1]) for t in own.values())
-    low = low if axis.start is None else max(low, axis.start)
-    high = high if axis.stop is None else min(high, axis.stop)
-    grid = finest[(finest >= low) & (finest <= high)]
-    if grid.size < 2:
-        raise RecordingError(
-            f"{path}: {grid.size} samples lie between {low:g} s and {high:g} s, at least 2 are needed;"
-            f" the file runs from {finest[0]:g} s to {finest[-1]:g} s."
-        )
-    if axis.step is None:
-        return grid
-    count = int(np.floor((grid[-1] - grid[0]) / axis.step * (1 + 1e-12))) + 1
-    if not 2 <= count <= 100_000_000:
-        raise RecordingError(
-            f"{path}: a step of {axis.step:g} s does not fit a recording of {grid[-1] - grid[0]:g} s."
-        )
-    resampled: FloatArray = np.minimum(grid[0] + axis.step * np.arange(count), grid[-1])
-    return resampled
-
-
-def _check_finite(path: Path, asked: str, values: FloatArray, time: FloatArray, kept: object) -> None:
-    bad = np.flatnonzero(~np.isfinite(values) & np.asarray(kept))
-    if bad.size:
-        k = int(bad[0])
-        raise RecordingError(
-            f"{path}: column {asked!r} is {values[k]} at {time[k]:g} s (sample {k + 1}, {bad.size} in all);"
-            f" repair the file or cut it with recordings.time.start and .stop."
-        )
-
-
-def _source_unit(path: Path, asked: str, given: str | None, stated: str | None, key: str) -> str:
-    """Return the unit of the file's numbers: the scenario's, else the file's; they may not differ."""
-    if given is None:
-        if stated is None:
-            raise UnitError(f'{path}: column {asked!r} states no unit; add unit = "..." under {key}.')
-        try:
-            conversion(stated, stated)
-        except UnitError as error:
-            raise UnitError(f"{path}: column {asked!r}: {error}") from None
-        return stated
-    try:
-        conversion(given, given)
-    except UnitError as error:
-        raise UnitError(f"{path}: unit of column {asked!r} ({key}.unit): {error}") from None
-    if stated is None:
-        return given
-    try:
-        same = np.allclose(conversion(given, stated), (1.0, 0.0), rtol=1e-9, atol=1e-12)
-    except UnitError:
-        try:
-            conversion(stated, stated)
-        except UnitError:
-            return given  # the file's unit is no unit ("counts/div"): the scenario knows better
-        same = False
-    if not same:
-        raise UnitError(
-            f"{path}: column {asked!r} is in {stated!r} by the file, but {key}.unit says {given!r};"
-            f" correct one of them."
-        )
-    return given
-
-
 def _to_unit(
     path: Path, signal: str, source: Column, stated: str | None, target: str | None, values: FloatArray
 ) -> FloatArray:
@@ -346,7 +227,7 @@ def _to_unit(
         return values
     label = source.column or "value"
     key = "temperature" if signal == _TEMPERATURE else f"recordings.columns.{signal}"
-    unit = _source_unit(path, label, source.unit, stated, key)
+    unit = source_unit(path, label, source.unit, stated, key)
     try:
         return convert(values, unit, target or unit)
     except UnitError as error:

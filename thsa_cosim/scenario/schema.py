@@ -14,6 +14,7 @@ from thsa_cosim.search.strategies import Strategy
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
+Moderate = Annotated[float, Field(ge=-1e30, le=1e30)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Name = Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")]
 
@@ -66,11 +67,11 @@ class ColumnTable(Table):
     """``[recordings.columns.<FMU variable>]``."""
 
     column: Name | None = None
-    value: float | None = None
+    value: Moderate | None = None
     unit: str | None = None
-    scale: float = 1.0
-    offset: float = 0.0
-    shift: float = 0.0
+    scale: Moderate = 1.0
+    offset: Moderate = 0.0
+    shift: Moderate = 0.0
     smooth: Literal["none", "mean"] = "none"
     interpolation: Literal["linear", "hold"] = "linear"
 
@@ -98,7 +99,7 @@ class TemperatureTable(Table):
     input: Name | None = None
     column: Name | None = None
     unit: str | None = None
-    round_to: Positive = 1.0
+    round_to: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
     group: Literal["point", "joint"] = "point"
 
     @model_validator(mode="after")

@@ -1,0 +1,194 @@
+"""What can be said about an FMU without running it, and what a trial run needs to know."""
+
+import contextlib
+import os
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from thsa_cosim.fmu.archive import open_archive
+from thsa_cosim.fmu.description import FmuDescription, Variable
+from thsa_cosim.fmu.inputs import input_mode
+from thsa_cosim.fmu.native import platform_folders
+from thsa_cosim.signals import FloatArray, Signals
+
+_STEPS = 2000
+"""Communication steps of a trial at most; a longer default experiment is cut short."""
+_OUTPUTS = 200
+"""Variables compared at most."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the description says, in plain types."""
+
+    model: str
+    fmi_version: str
+    tool: str
+    interfaces: tuple[str, ...]
+    platforms: tuple[str, ...]
+    capabilities: Mapping[str, bool | int]
+    variables: Mapping[str, tuple[str, ...]]
+    """Names by role: input, output, parameter (fixed), tunable parameter."""
+    other_variables: int
+    states: int
+    event_indicators: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the facts as JSON types."""
+        return {
+            "model": self.model,
+            "fmi_version": self.fmi_version,
+            "tool": self.tool,
+            "interfaces": list(self.interfaces),
+            "platforms": list(self.platforms),
+            "capabilities": dict(self.capabilities),
+            "variables": {role: list(names) for role, names in self.variables.items()},
+            "other_variables": self.other_variables,
+            "states": self.states,
+            "event_indicators": self.event_indicators,
+        }
+
+
+def facts(description: FmuDescription) -> Facts:
+    """Collect the facts of a description."""
+    interfaces = {
+        "Co-Simulation": description.supports_co_simulation,
+        "Model Exchange": description.supports_model_exchange,
+    }
+    roles = {
+        "input": description.inputs,
+        "output": description.outputs,
+        "parameter": tuple(v for v in description.parameters if v.variability != "tunable"),
+        "tunable parameter": tuple(v for v in description.parameters if v.variability == "tunable"),
+    }
+    return Facts(
+        model=description.model_name,
+        fmi_version=description.fmi_version,
+        tool=description.tool or "unknown tool",
+        interfaces=tuple(name for name, offered in interfaces.items() if offered),
+        platforms=description.platforms,
+        capabilities=description.capabilities,
+        variables={role: tuple(v.name for v in members) for role, members in roles.items()},
+        other_variables=len(description.variables) - sum(len(members) for members in roles.values()),
+        states=description.states,
+        event_indicators=description.event_indicators,
+    )
+
+
+def validation_messages(path: Path) -> tuple[str, ...]:
+    """Return what fmpy's validation finds wrong with the description, one sentence each."""
+    from fmpy.validation import validate_fmu
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            problems = validate_fmu(str(path))
+    except Exception as error:  # the validation itself stumbles over some descriptions
+        problems = [f"the validation stopped: {type(error).__name__}: {error}"]
+    return tuple(" ".join(str(problem).split()) for problem in problems)
+
+
+def missing_binary(description: FmuDescription) -> str:
+    """Return why this machine cannot load the FMU, or an empty string."""
+    wanted = platform_folders(description.fmi_version)
+    with open_archive(description.path) as archive:
+        folders = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
+        has_sources = any(name.startswith("sources/") for name in archive.namelist())
+    if folders & set(wanted):
+        return ""
+    remedy = (
+        "it has C sources: build it with `fmpy compile`" if has_sources else "export it for this platform"
+    )
+    return f"no binary for {wanted[0]} (it has {', '.join(sorted(folders)) or 'none'}); {remedy}"
+
+
+def input_handling(description: FmuDescription) -> str:
+    """Return how inputs that change within a communication step reach this FMU in Co-Simulation."""
+    linear = [v for v in description.inputs if v.is_float and v.variability == "continuous"]
+    return input_mode(description, linear)
+
+
+def trial_time(description: FmuDescription) -> FloatArray:
+    """Return the communication points of a trial, (n,) s: the default experiment, at most 2000 steps."""
+    default = description.default_experiment
+    start = default.start or 0.0
+    stop = default.stop if default.stop is not None and default.stop > start else start + 1.0
+    step = default.step if default.step and default.step > 0.0 else (stop - start) / 500.0
+    count = int(np.clip(np.round((stop - start) / step), 1, _STEPS))
+    return np.asarray(start + step * np.arange(count + 1), dtype=np.float64)
+
+
+def halved(time: FloatArray) -> FloatArray:
+    """Return ``time`` with a point in the middle of every step."""
+    fine: FloatArray = np.empty(2 * len(time) - 1)
+    fine[::2], fine[1::2] = time, 0.5 * (time[1:] + time[:-1])
+    return fine
+
+
+def observed(description: FmuDescription) -> tuple[str, ...]:
+    """Return the names to compare: numeric outputs, or local variables where there are no outputs."""
+    for causality in ("output", "local"):
+        names = [
+            v.name
+            for v in description.variables.values()
+            if v.causality == causality and v.is_float and not v.is_array and v.variability != "constant"
+        ]
+        if names:
+            return tuple(names[:_OUTPUTS])
+    return ()
+
+
+def raised_inputs(description: FmuDescription, time: FloatArray) -> Signals | None:
+    """Return inputs that ramp up from their start values over the first half of ``time``, None if none can.
+
+    By a tenth of the range or of the start value, or by the nominal value, whichever is declared.
+    """
+    ramp = np.clip(2.0 * (time - time[0]) / (time[-1] - time[0]), 0.0, 1.0)
+    values = {
+        v.name: (v.start or 0.0) + _amplitude(v) * ramp
+        for v in description.inputs
+        if v.is_float and not v.is_array and v.variability == "continuous"
+    }
+    return Signals(time, values) if values else None
+
+
+def _amplitude(variable: Variable) -> float:
+    start = variable.start or 0.0
+    if variable.nominal is not None:
+        size = abs(variable.nominal)
+    elif variable.minimum is not None and variable.maximum is not None:
+        size = 0.1 * (variable.maximum - variable.minimum)
+    else:
+        size = 0.1 * abs(start) or 1.0
+    if variable.maximum is not None and start + size > variable.maximum:
+        return -size if variable.minimum is None or start - size >= variable.minimum else 0.0
+    return size
+
+
+def changed_parameters(description: FmuDescription) -> dict[str, float]:
+    """Return start values 1 % off for floating-point parameters that are not 0, within their bounds."""
+    changed = {}
+    for v in description.parameters:
+        if not v.is_float or v.is_array or not v.start:
+            continue
+        for value in (v.start * 1.01, v.start * 0.99):
+            above = v.minimum is None or value >= v.minimum
+            if above and (v.maximum is None or value <= v.maximum):
+                changed[v.name] = value
+                break
+    return changed
+
+
+def footprint(_: Signals) -> FloatArray:
+    """Reduce a run to its process: process id, resident bytes, open file handles (NaN where unknown)."""
+    resident = handles = np.nan
+    with contextlib.suppress(OSError, ValueError):
+        page = os.sysconf("SC_PAGE_SIZE")
+        resident = int(Path("/proc/self/statm").read_text().split()[1]) * page
+        handles = len(list(Path("/proc/self/fd").iterdir()))
+    return np.array([os.getpid(), resident, handles], dtype=np.float64)

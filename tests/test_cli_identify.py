@@ -12,6 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from thsa_cosim.ssv import read_ssv
+
 ROOT = Path(__file__).parents[1]
 MOTOR = ROOT / "scenarios" / "motor.toml"
 pytestmark = pytest.mark.skipif(
@@ -103,6 +105,10 @@ def test_the_study_folder_holds_readable_tables_and_plots(study) -> None:
     assert laws["R_s [ohm]"].iloc[0] == pytest.approx(result["laws"]["R_s"]["at"]["-30.0"])
     journal = pd.read_csv(folder / "journal.csv")
     assert {"R_s", "psi_pm", "T_fm", "b_m", "cost", "cost.i_q", "status"} <= set(journal.columns)
+    assert "parameter Real 'motor.R_s.a0'(unit=" in (folder / "Identified.mo").read_text()
+    identified = read_ssv(folder / "identified.ssv")
+    assert identified.values["motor.R_s.a1"] == result["laws"]["R_s"]["coefficients"][1]
+    assert identified.units["motor.R_s.a0"] == "Ohm"
     plots = {p.name for p in (folder / "plots").iterdir()}
     assert {"law_R_s.png", "fit_motor_m30.png", "validate_motor_m10.png", "convergence.png"} <= plots
 

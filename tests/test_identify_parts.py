@@ -10,13 +10,19 @@ import pytest
 
 from thsa_cosim.costs import Channel, ResidualReducer, TermsReducer
 from thsa_cosim.errors import InputError
+from thsa_cosim.fmu import DefaultExperiment, FmuDescription, Variable
 from thsa_cosim.identify.compare import summarise
 from thsa_cosim.identify.interleave import interleave
 from thsa_cosim.identify.over_temperature import fit_laws, values_at
+from thsa_cosim.identify.parameter_set import law_values, parameter_set
 from thsa_cosim.identify.results import ChannelError, Comparison, Estimate, PointResult
 from thsa_cosim.identify.study import MARKER, open_study
+from thsa_cosim.laws import published_law
+from thsa_cosim.parameters import Parameter, ParameterSpace
+from thsa_cosim.report.parameter_files import modelica_record
 from thsa_cosim.scenario import LawSpec
 from thsa_cosim.signals import Signals
+from thsa_cosim.ssv import ParameterSet
 
 
 def countdown(steps: int):
@@ -226,3 +232,66 @@ def test_a_damaged_marker_is_named(tmp_path: Path, content: str) -> None:
     (tmp_path / MARKER).write_text(content)
     with pytest.raises(InputError, match=r"study\.json is damaged"):
         open_study(tmp_path, IDENTITY)
+
+
+def description(*names: str) -> FmuDescription:
+    variables = {
+        name: Variable(name, k, "parameter", "fixed", "Real", unit="Ohm") for k, name in enumerate(names)
+    }
+    return FmuDescription(
+        path=Path("x.fmu"),
+        sha256="",
+        model_name="x",
+        fmi_version="2.0",
+        tool="",
+        guid="",
+        supports_co_simulation=True,
+        supports_model_exchange=False,
+        capabilities={},
+        variables=variables,
+        default_experiment=DefaultExperiment(),
+        platforms=(),
+    )
+
+
+BLOCK = [f"m.R.{c}" for c in ("a0", "a1", "a2", "a3", "alpha1", "beta1", "alpha2", "beta2")]
+
+
+def test_a_law_becomes_the_start_values_of_its_block_in_the_fmus_unit() -> None:
+    space = ParameterSpace((Parameter("R", "m.R.a0", "mOhm", 0.0, 9e3, variable_unit="Ohm"),))
+    laws, _ = fit_laws(POINTS, {"R": LawSpec("linear")})
+    found, notes = parameter_set("set", space, POINTS, laws, description(*BLOCK))
+    assert notes == []
+    assert set(found.values) == set(BLOCK)
+    assert found.values["m.R.a0"] == pytest.approx(1e-3)
+    assert found.values["m.R.a1"] == pytest.approx(1e-4)
+    assert found.values["m.R.beta1"] == 0.0
+    assert found.units["m.R.a0"] == "Ohm"
+
+
+def test_rates_of_exponentials_keep_their_size_when_the_unit_changes() -> None:
+    parameter = Parameter("R", "m.R.a0", "mOhm", 0.0, 9e3, variable_unit="Ohm")
+    values = law_values(parameter, published_law("exponential", [2.0, -0.03]), description(*BLOCK))
+    assert values is not None
+    assert values["m.R.alpha1"] == pytest.approx(2e-3)
+    assert values["m.R.beta1"] == -0.03
+
+
+def test_several_values_without_a_law_are_left_out_and_said() -> None:
+    space = ParameterSpace((Parameter("R", "plain", "Ohm", 0.0, 9.0),))
+    found, notes = parameter_set("set", space, POINTS, {}, description("plain"))
+    assert dict(found.values) == {}
+    assert "several values and no law" in notes[0]
+    found, _ = parameter_set("set", space, POINTS[:1], {}, description("plain"))
+    assert found.values == {"plain": -1.0}
+
+
+def test_the_modelica_record_quotes_what_is_no_plain_name() -> None:
+    values = ParameterSet("s", {"m.R.a0": 0.1, "L": 2e-3, "it's": 1.0}, {"m.R.a0": "Ohm"}, 'a "b"')
+    assert modelica_record(values) == (
+        'record Identified "a \\"b\\""\n'
+        "  parameter Real 'm.R.a0'(unit=\"Ohm\") = 0.1;\n"
+        "  parameter Real L = 0.002;\n"
+        "  parameter Real 'it\\'s' = 1.0;\n"
+        "end Identified;\n"
+    )

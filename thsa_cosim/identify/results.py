@@ -7,6 +7,7 @@ from pathlib import Path
 from thsa_cosim.laws import Law
 from thsa_cosim.search import Generation
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.ssv import ParameterSet
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,8 @@ class IdentifyResult:
     errors: Mapping[str, Mapping[str, ChannelError]]
     evaluations: int
     failures: Mapping[str, int]
+    parameter_set: ParameterSet
+    """The identified laws (or single values) as start values in the FMU's units."""
     notes: tuple[str, ...] = ()
     settings: Mapping[str, object] = field(default_factory=dict)
 

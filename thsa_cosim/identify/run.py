@@ -14,6 +14,7 @@ from thsa_cosim.identify.compare import compare, summarise
 from thsa_cosim.identify.evaluate import Evaluator, Reply, Request, residual_experiment, terms_experiment
 from thsa_cosim.identify.interleave import interleave
 from thsa_cosim.identify.over_temperature import fit_laws, values_at
+from thsa_cosim.identify.parameter_set import parameter_set
 from thsa_cosim.identify.point import PointSearch, search_point
 from thsa_cosim.identify.problem import Case, PointProblem, build_case, build_point
 from thsa_cosim.identify.results import Comparison, IdentifyResult, LawResult, PointResult, Progress
@@ -140,13 +141,15 @@ class _Study:
         scenario, evaluator = self._scenario, self._evaluator
         laws, notes = self._laws()
         comparisons = [*self._fit_comparisons(), *self._comparisons]
+        title = scenario.title or scenario.path.stem
+        identified, left_out = parameter_set(title, scenario.parameters, self._results(), laws, scenario.fmu)
         failed = [
             f"{self._points[k].label} has no result: {found.reason}"
             for k, found in sorted(self._found.items())
             if found.result is None
         ]
         return IdentifyResult(
-            title=scenario.title or scenario.path.stem,
+            title=title,
             status="interrupted" if self.interrupted else "complete",
             seed=scenario.seed,
             version=__version__,
@@ -160,7 +163,8 @@ class _Study:
             errors=summarise(comparisons),
             evaluations=0 if evaluator is None else sum(evaluator.evaluations),
             failures={} if evaluator is None else evaluator.failures,
-            notes=(*failed, *notes, *self._notes),
+            parameter_set=identified,
+            notes=(*failed, *notes, *left_out, *self._notes),
             settings={**asdict(scenario.search), "error": scenario.cost.error},
         )
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from thsa_cosim.identify.results import IdentifyResult
+from thsa_cosim.report.parameter_files import write_parameter_set
 from thsa_cosim.report.result_json import (
     identify_to_dict,
     write_json,
@@ -37,6 +38,9 @@ def write_identify(
     if result.laws:
         write_laws_csv(folder / "laws.csv", result)
         note(folder / "laws.csv")
+    if result.parameter_set.values:
+        for path in write_parameter_set(folder, result.parameter_set):
+            note(path)
     plots = folder / "plots"
     for law in result.laws.values():
         path = plots / f"law_{file_name(law.parameter)}.png"

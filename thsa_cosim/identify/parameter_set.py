@@ -1,0 +1,63 @@
+"""What was identified as FMU start values: the laws' coefficients, or the one value there is."""
+
+from collections.abc import Mapping, Sequence
+
+from thsa_cosim.fmu import FmuDescription
+from thsa_cosim.identify.results import LawResult, PointResult
+from thsa_cosim.laws import Law
+from thsa_cosim.parameters import Parameter, ParameterSpace
+from thsa_cosim.ssv import ParameterSet
+
+_COEFFICIENTS = ("a0", "a1", "a2", "a3", "alpha1", "beta1", "alpha2", "beta2")
+
+
+def law_block(variable: str, fmu: FmuDescription) -> str | None:
+    """The ``TemperatureLaw`` block whose constant coefficient ``variable`` is, or None."""
+    block, _, last = variable.rpartition(".")
+    complete = all(f"{block}.{name}" in fmu.variables for name in _COEFFICIENTS)
+    return block if last == "a0" and complete else None
+
+
+def point_values(parameter: Parameter, value: float, fmu: FmuDescription) -> dict[str, float]:
+    """Start values that make ``parameter`` equal ``value`` (its unit) at every temperature."""
+    own = parameter.to_variable(value)
+    block = law_block(parameter.variable, fmu)
+    return {parameter.variable: own} if block is None else Law("constant", (own,)).block_values(block)
+
+
+def law_values(parameter: Parameter, law: Law, fmu: FmuDescription) -> dict[str, float] | None:
+    """Start values of the block that holds ``law``; None if the FMU or the form has no such block."""
+    block = law_block(parameter.variable, fmu)
+    proportional = parameter.to_variable(0.0) == 0.0
+    if block is None or law.form == "spline" or not proportional:
+        return None
+    factor = parameter.to_variable(1.0)
+    values = law.block_values(block)
+    return {name: value if ".beta" in name else value * factor for name, value in values.items()}
+
+
+def parameter_set(
+    name: str,
+    space: ParameterSpace,
+    points: Sequence[PointResult],
+    laws: Mapping[str, LawResult],
+    fmu: FmuDescription,
+) -> tuple[ParameterSet, list[str]]:
+    """Everything identified as start values in the FMU's units, and one sentence per parameter left out."""
+    values: dict[str, float] = {}
+    notes: list[str] = []
+    for parameter in space.parameters:
+        found = [p.parameters[parameter.name] for p in points if parameter.name in p.parameters]
+        law = laws.get(parameter.name)
+        from_law = law_values(parameter, law.law, fmu) if law is not None else None
+        if from_law is not None:
+            values.update(from_law)
+        elif len(found) == 1:
+            values.update(point_values(parameter, found[0].value, fmu))
+        elif found:
+            notes.append(
+                f"{parameter.name} is not in the parameter set: it has several values and no law that"
+                f" {fmu.path.name} can hold."
+            )
+    units = {v: fmu.variables[v].unit or "" for v in values if v in fmu.variables}
+    return ParameterSet(name, values, units, "identified by thsa-cosim"), notes

@@ -13,10 +13,10 @@ from thsa_cosim.scenario.model import (
     Scenario,
     SearchSpec,
     SimulationSpec,
-    Stage,
     TemperaturePoint,
 )
 from thsa_cosim.scenario.schema import KINDS
+from thsa_cosim.scenario.stages import Stage, StagedScenario, hand_on, load_study
 
 __all__ = [
     "KINDS",
@@ -27,6 +27,9 @@ __all__ = [
     "SearchSpec",
     "SimulationSpec",
     "Stage",
+    "StagedScenario",
     "TemperaturePoint",
+    "hand_on",
     "load_scenario",
+    "load_study",
 ]

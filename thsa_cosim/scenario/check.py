@@ -148,19 +148,26 @@ def fixed(path: Path, table: CommonTable, fmu: FmuDescription, space: ParameterS
         if name in searched:
             raise ScenarioError(f"{key} is searched for as parameter {searched[name]!r}; remove one of them.")
         own[name] = float(value)
-    zeroed: dict[str, float] = {}
     for parameter in table.parameters if isinstance(table, IdentifyTable) else ():
-        for name in _zeroed(fmu, parameter):
-            if name not in searched:
-                zeroed[name] = 0.0
         for pattern in parameter.zero:
             if pattern in own and own[pattern] != 0.0:
                 raise ScenarioError(
                     f"parameters[{parameter.name}].zero sets {pattern!r} to 0, [fixed] to {own[pattern]:g};"
                     f" remove one of them."
                 )
-    merged = {**values, **zeroed, **own}
+    zeros = {name: 0.0 for names in zeroed(table, fmu).values() for name in names}
+    merged = {**values, **zeros, **own}
     return {name: value for name, value in merged.items() if name not in searched}
+
+
+def zeroed(table: CommonTable, fmu: FmuDescription) -> dict[str, tuple[str, ...]]:
+    """Return, by parameter name, the FMU parameters that its ``zero`` and ``law_block`` set to 0."""
+    if not isinstance(table, IdentifyTable):
+        return {}
+    apart = {p.variable for p in table.parameters} | set(table.fixed)
+    return {
+        p.name: tuple(dict.fromkeys(n for n in _zeroed(fmu, p) if n not in apart)) for p in table.parameters
+    }
 
 
 def _zeroed(fmu: FmuDescription, parameter: ParameterTable) -> list[str]:

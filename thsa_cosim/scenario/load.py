@@ -149,6 +149,7 @@ def _resolve(
         search=_search(table, space),
         simulation=_simulation(table),
         round_to=table.temperature.round_to if table.temperature else 1.0,
+        zeroed=check.zeroed(table, description),
     )
     if isinstance(table, IdentifyTable):
         for recording in scenario.fit:

@@ -92,14 +92,6 @@ class TemperaturePoint:
         return "all" if self.temperature_degC is None else f"{self.temperature_degC:.6g} degC"
 
 
-@dataclass(frozen=True)
-class Stage:
-    """One scenario of several that run in order; ``give`` None hands on every result."""
-
-    scenario: Path
-    give: tuple[str, ...] | None = None
-
-
 @dataclass(frozen=True, eq=False)
 class Scenario:
     """What to run and what to compare it with.
@@ -127,6 +119,8 @@ class Scenario:
     search: SearchSpec
     simulation: SimulationSpec
     round_to: float = 1.0
+    zeroed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """FMU parameters that are 0 because of a parameter's ``zero`` or ``law_block``, by its name."""
 
     def drive(self, recording: Recording) -> Signals:
         """Return the FMU's inputs of a recording."""

@@ -1,0 +1,125 @@
+"""Scenarios in stages: benches in order, each with what the earlier ones found."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from thsa_cosim.errors import InputError, ScenarioError, UnitError, did_you_mean
+from thsa_cosim.scenario.load import load_scenario, read_toml
+from thsa_cosim.scenario.model import Scenario
+from thsa_cosim.scenario.schema import KINDS, StagesTable
+from thsa_cosim.scenario.sentences import from_validation, one_line
+from thsa_cosim.units import convert
+
+Found = Callable[[float | None], Mapping[str, float]]
+"""Values by parameter name, in the scenario's units, for a temperature [degC] (None: there is only one)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One scenario of several; ``give`` names the results that later stages get."""
+
+    name: str
+    scenario: Scenario
+    give: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class StagedScenario:
+    """Scenarios that run in order."""
+
+    kind: str
+    path: Path
+    title: str
+    stages: tuple[Stage, ...]
+
+
+def load_study(
+    path: Path | str,
+    *,
+    fit: Sequence[Path | str] = (),
+    validate: Sequence[Path | str] = (),
+    seed: int | None = None,
+    fmu: Path | str | None = None,
+) -> Scenario | StagedScenario:
+    """Read a scenario file, or one that names others under ``[[stages]]``; all of them are checked at once.
+
+    Raises
+    ------
+    ThsaCosimError
+        As :func:`load_scenario`, and ScenarioError for stages that cannot work.
+    """
+    path = Path(path)
+    data = read_toml(path)
+    if "stages" not in data:
+        return load_scenario(path, fit=fit, validate=validate, seed=seed, fmu=fmu)
+    try:
+        table = StagesTable.model_validate(data)
+    except ValidationError as error:
+        raise from_validation(path, data, error) from None
+    if table.kind not in KINDS:
+        raise ScenarioError(one_line(f"{path}: kind is {table.kind!r}.{did_you_mean(table.kind, KINDS)}"))
+    if fit or validate or fmu:
+        raise ScenarioError(
+            f"{path}: has stages with recordings and FMUs of their own; replace them in the stages' files,"
+            f" or run one stage alone."
+        )
+    stages = [_stage(path, k, table, seed) for k in range(len(table.stages))]
+    names = [stage.name for stage in stages]
+    if repeated := {name for name in names if names.count(name) > 1}:
+        raise ScenarioError(one_line(f"{path}: stage {min(repeated)!r} appears twice; remove one."))
+    return StagedScenario(table.kind, path, table.title, tuple(stages))
+
+
+def _stage(path: Path, k: int, table: StagesTable, seed: int | None) -> Stage:
+    spec = table.stages[k]
+    file = path.parent / spec.scenario
+    key = f"stages[{k + 1}]"
+    try:
+        if "stages" in read_toml(file):
+            raise ScenarioError(f"{file} has stages itself; list those instead.")
+        scenario = load_scenario(file, seed=table.seed if seed is None else seed)
+    except InputError as error:
+        raise type(error)(one_line(f"{path}: {key}: {error}")) from None
+    known = scenario.parameters.names
+    for name in spec.give or ():
+        if name not in known:
+            raise ScenarioError(
+                one_line(
+                    f"{path}: {key}.give names {name!r}, which {file.name} does not find."
+                    f"{did_you_mean(name, known)}"
+                )
+            )
+    return Stage(file.stem, scenario, tuple(spec.give) if spec.give is not None else known)
+
+
+def hand_on(stage: Stage, found: Found, target: Scenario) -> Scenario:
+    """Return ``target`` with what ``stage`` found as start values, at each of the target's temperatures.
+
+    Parameters of FMU variables that the target's FMU does not have, or that the target searches for itself, are
+    left out. The other coefficients of a found law are 0 there as they were in the stage.
+
+    Raises
+    ------
+    ScenarioError
+        If a variable has another dimension in the target's FMU.
+    """
+    variables = target.fmu.variables
+    given: dict[float | None, dict[str, float]] = {}
+    for point in target.points:
+        values = found(point.temperature_degC)
+        start: dict[str, float] = {}
+        for name in stage.give:
+            parameter = stage.scenario.parameters[name]
+            if parameter.variable not in variables:
+                continue
+            start.update({zero: 0.0 for zero in stage.scenario.zeroed.get(name, ()) if zero in variables})
+            unit = variables[parameter.variable].unit or parameter.variable_unit or parameter.unit
+            try:
+                start[parameter.variable] = convert(values[name], parameter.unit, unit)
+            except UnitError as error:
+                raise ScenarioError(one_line(f"{target.path}: {parameter.variable!r}: {error}")) from None
+        given[point.temperature_degC] = start
+    return target.given(given)

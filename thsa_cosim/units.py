@@ -97,8 +97,7 @@ def conversion(source: str, target: str) -> tuple[float, float]:
             offset = registry.Quantity(0.0, a).to(b).magnitude
     except Exception:
         raise UnitError(
-            f"unit {source!r} cannot be turned into {target!r}: the dimensions differ"
-            f" ({a.dimensionality} against {b.dimensionality})."
+            f"unit {source!r} cannot be turned into {target!r} (their dimensions differ); correct the unit."
         ) from None
     return factor, offset
 

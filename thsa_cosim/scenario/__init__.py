@@ -2,7 +2,7 @@
 
 ``schema`` holds the file's tables (one pydantic class each, one class per kind), ``model`` the frozen objects
 that the use cases get, ``load`` turns the one into the other, ``check`` holds a scenario against its FMU and
-``sentences`` turns a wrong key or value into one sentence.
+``sentences`` turns a wrong key or value into one sentence; ``stages`` runs several scenarios in order.
 """
 
 from thsa_cosim.scenario.load import load_scenario

@@ -18,6 +18,10 @@ _SETTABLE = ("parameter", "structuralParameter")
 def _variable(fmu: FmuDescription, name: str, key: str, candidates: tuple[Variable, ...] = ()) -> Variable:
     """Return the FMU's variable; ScenarioError with the closest of ``candidates`` (default: all)."""
     if name in fmu.variables:
+        if fmu.variables[name].is_array:
+            raise ScenarioError(
+                f"{key}: {name!r} of {fmu.path.name} is an array; only single numbers are supported."
+            )
         return fmu.variables[name]
     known = [v.name for v in candidates] or list(fmu.variables)
     hint = did_you_mean(name, known)

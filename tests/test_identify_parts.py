@@ -156,6 +156,7 @@ def point(temperature: float | None, **values: float) -> PointResult:
         cost=1.0,
         cost_per_sample=1.0,
         terms={},
+        also={},
         generations=(),
         evaluations=1,
         converged=True,

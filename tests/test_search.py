@@ -13,6 +13,7 @@ from thsa_cosim.search import (
     evolve,
     long_run_covariance,
     polish,
+    with_given,
 )
 
 TIME = np.linspace(0.0, 10.0, 2000)
@@ -280,3 +281,23 @@ def test_long_run_covariance_of_an_autoregression() -> None:
     rho = 0.5
     total = np.mean([long_run_covariance(noise(s, rho)[:, None], 60)[0, 0] / TIME.size for s in range(30)])
     assert total == pytest.approx((1.0 + rho) / (1.0 - rho), rel=0.1)
+
+
+def test_uncertain_held_values_widen_the_errors_as_simulated() -> None:
+    """y = (a + h) e^-t + b with h held at a noisy guess: a inherits all of the guess's error, b none of it."""
+
+    def model(u: np.ndarray, held: float) -> np.ndarray:
+        return (u[0] + held) * np.exp(-TIME) + u[1]
+
+    found, stated = [], []
+    for seed in range(40):
+        guess = 0.2 + 0.05 * np.random.default_rng(1000 + seed).normal()
+        measured = model(np.array([0.4, 0.3]), 0.2) + 0.1 * noise(seed)
+        result, sure = fitted(lambda u, g=guess: model(u, g), measured, start=(0.5, 0.5))
+        slope = (np.exp(-TIME) / 0.1)[:, None]
+        widened = with_given(sure, result.jacobian, slope, np.array([[0.05**2]]))
+        found.append(result.best)
+        stated.append(widened.stderr)
+        assert widened.stderr[1] == pytest.approx(sure.stderr[1], rel=1e-6)
+    assert np.std(found, axis=0) == pytest.approx(np.mean(stated, axis=0), rel=0.3)
+    assert np.mean(stated, axis=0)[0] > 0.05

@@ -12,7 +12,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 import click
 
@@ -21,6 +21,9 @@ from thsa_cosim.errors import InputError, ThsaCosimError
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from thsa_cosim.identify import Progress
+    from thsa_cosim.scenario import Scenario, StagedScenario
 
 PATH = click.Path(path_type=Path)
 
@@ -135,28 +138,61 @@ def identify(
     as_json: bool,
 ) -> None:
     """Identify parameters from recordings as SCENARIO says, point by point over temperature."""
-    from thsa_cosim.identify import identify as run
     from thsa_cosim.report.progress import ProgressDisplay
-    from thsa_cosim.report.study import RESULT, write_identify
-    from thsa_cosim.report.tables import print_identify
-    from thsa_cosim.scenario import load_scenario
+    from thsa_cosim.report.study import RESULT
+    from thsa_cosim.scenario import Scenario, load_study
 
-    loaded = load_scenario(scenario, fit=fit, validate=validate, seed=seed, fmu=fmu)
+    loaded = load_study(scenario, fit=fit, validate=validate, seed=seed, fmu=fmu)
     _check_kind(scenario, loaded.kind, "identify")
     folder = output or default_folder(scenario)
     with ProgressDisplay(_console(stderr=True), quiet=quiet) as display:
-        result = run(loaded, folder=folder, workers=workers or cores(), cluster=cluster, on_progress=display)
-    files = write_identify(result, folder)
-    if result.status == "interrupted":
+        options: _RunOptions = {
+            "folder": folder,
+            "workers": workers or cores(),
+            "cluster": cluster,
+            "on_progress": display,
+        }
+        finish = _identify_one(loaded, options) if isinstance(loaded, Scenario) else _stages(loaded, options)
+    files, status, show = finish
+    if status == "interrupted":
         raise _Interrupted(_continue_command("identify", scenario, folder))
     if as_json:
         click.echo((folder / RESULT).read_text(encoding="utf-8"), nl=False)
     elif not quiet:
         console = _console()
-        print_identify(console, result)
+        show(console)
         console.print(
             f"\n{len(files)} files in {folder}; the numbers are in {folder / RESULT}", soft_wrap=True
         )
+
+
+class _RunOptions(TypedDict):
+    folder: Path
+    workers: int
+    cluster: str | None
+    on_progress: Callable[["Progress"], None]
+
+
+_Finished = tuple[list[Path], str, Callable[["Console"], None]]
+
+
+def _identify_one(scenario: "Scenario", options: _RunOptions) -> _Finished:
+    from thsa_cosim.identify import identify as run
+    from thsa_cosim.report.study import write_identify
+    from thsa_cosim.report.tables import print_identify
+
+    result = run(scenario, **options)
+    files = write_identify(result, options["folder"])
+    return files, result.status, lambda console: print_identify(console, result)
+
+
+def _stages(staged: "StagedScenario", options: _RunOptions) -> _Finished:
+    from thsa_cosim.report.staged import print_staged, write_staged
+    from thsa_cosim.staged import run_stages
+
+    result = run_stages(staged, **options)
+    files = write_staged(result, options["folder"])
+    return files, result.status, lambda console: print_staged(console, result)
 
 
 @cli.command()

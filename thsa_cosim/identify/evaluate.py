@@ -34,10 +34,14 @@ class Want(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """Vectors (m, n) in the unit cube to be simulated at a point."""
+    """Vectors (m, n) in the unit cube to be simulated at a point.
+
+    ``overrides``: per vector further start values, which win over the scenario's; empty for none.
+    """
 
     want: Want
     vectors: FloatArray
+    overrides: tuple[Mapping[str, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +125,8 @@ class Evaluator:
                 vector = _Vector(k, row, named, len(point.cases), [None] * len(point.cases))
                 for c, case in enumerate(point.cases):
                     assigned = point.space.assignments(named, case.name)
+                    if request.overrides:
+                        assigned |= request.overrides[row]
                     keep = request.want is Want.SIGNALS
                     jobs.append(Job(_name(case, request.want), assigned, keep_signals=keep))
                     owners.append((vector, c, position))

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from thsa_cosim.costs import TermsReducer
 from thsa_cosim.identify.evaluate import Reply, Request, Want
-from thsa_cosim.identify.problem import PointProblem
+from thsa_cosim.identify.problem import Given, PointProblem
 from thsa_cosim.identify.results import Estimate, PointResult
 from thsa_cosim.search import (
     EvolutionSettings,
@@ -16,6 +17,7 @@ from thsa_cosim.search import (
     estimate_uncertainty,
     evolve,
     polish,
+    with_given,
 )
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -84,10 +86,14 @@ def search_point(
                 space.names,
                 point.error,
             )
+            if point.given is not None:
+                shifts = _given_jacobian(point.given, best, found.residual, ask)
+                uncertainty = with_given(uncertainty, found.jacobian, shifts, point.given.covariance)
     final = ask(Request(Want.TERMS, best[None, :]))
     signals = ask(Request(Want.SIGNALS, best[None, :])).signals[0]
     if signals is None:
         return PointSearch(None, (), "the identified vector could not be simulated again")
+    also = {name: _total(point, signals, name) for name in point.also}
     terms = dict(zip(point.channel_names, final.terms[0].tolist(), strict=True))
     cost = float(np.sum(final.terms[0]))
     result = PointResult(
@@ -101,6 +107,7 @@ def search_point(
         cost=cost,
         cost_per_sample=cost / point.samples,
         terms=terms,
+        also=also,
         generations=evolution.history,
         evaluations=0,
         converged=evolution.converged,
@@ -108,6 +115,28 @@ def search_point(
         polished=polished,
     )
     return PointSearch(result, signals, "")
+
+
+def _total(point: PointProblem, signals: tuple[Signals, ...], error: str) -> float:
+    """Equation 6 with another f, at the estimate."""
+    pairs = zip(point.cases, signals, strict=True)
+    return float(sum(np.sum(TermsReducer(case.channels, error)(simulated)) for case, simulated in pairs))
+
+
+def _given_jacobian(given: Given, best: FloatArray, residual: FloatArray, ask: Ask) -> FloatArray:
+    """Derivative (N, m) of the residuals by the given values, central differences of one standard error."""
+    steps, names = given.stderr, list(given.values)
+    overrides = []
+    for name, step in zip(names, steps.tolist(), strict=True):
+        overrides += [{name: given.values[name] + step}, {name: given.values[name] - step}]
+    vectors = np.repeat(best[None, :], len(overrides), axis=0)
+    found = ask(Request(Want.RESIDUALS, vectors, tuple(overrides))).residuals if overrides else ()
+    jacobian = np.zeros((residual.size, len(names)))
+    for i in range(len(names)):
+        above, below = found[2 * i], found[2 * i + 1]
+        if above is not None and below is not None and steps[i] > 0.0:
+            jacobian[:, i] = (above - below) / (2.0 * steps[i])
+    return jacobian
 
 
 def _estimates(point: PointProblem, best: FloatArray, uncertainty: Uncertainty | None) -> dict[str, Estimate]:

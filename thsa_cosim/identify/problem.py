@@ -49,14 +49,35 @@ class Case:
 
 
 @dataclass(frozen=True, eq=False)
+class Given:
+    """Start values that an earlier stage found, and how sure they are.
+
+    ``values``: FMU variable → value in its unit; ``covariance`` (m, m) in the same order and units.
+    """
+
+    values: Mapping[str, float]
+    covariance: FloatArray
+
+    @property
+    def stderr(self) -> FloatArray:
+        """One standard error of each value (m,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+
+@dataclass(frozen=True, eq=False)
 class PointProblem:
-    """The recordings at one temperature (or all of them) and the parameters they share."""
+    """The recordings at one temperature (or all of them) and the parameters they share.
+
+    ``error`` is the f of equation 6 that is minimised, ``also`` those that are reported beside it.
+    """
 
     label: str
     temperature_degC: float | None
     cases: tuple[Case, ...]
     space: ParameterSpace
     error: str
+    also: tuple[str, ...] = ()
+    given: Given | None = None
 
     @property
     def channel_names(self) -> tuple[str, ...]:
@@ -129,7 +150,7 @@ def _counted(scenario: Scenario, time: FloatArray) -> np.ndarray[tuple[int], np.
     return counted
 
 
-def build_point(scenario: Scenario, point: TemperaturePoint) -> PointProblem:
+def build_point(scenario: Scenario, point: TemperaturePoint, given: Given | None = None) -> PointProblem:
     """The search at one of the scenario's points."""
     return PointProblem(
         label=point.label,
@@ -137,4 +158,6 @@ def build_point(scenario: Scenario, point: TemperaturePoint) -> PointProblem:
         cases=tuple(build_case(scenario, recording, point.fixed) for recording in point.fit),
         space=point.space,
         error=scenario.cost.error,
+        also=tuple(name for name in scenario.cost.also if name != scenario.cost.error),
+        given=given,
     )

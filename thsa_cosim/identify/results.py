@@ -53,9 +53,9 @@ class Comparison:
 class PointResult:
     """What was found at one temperature.
 
-    ``cost``: equation 6 at the estimate; ``cost_per_sample`` is 1 when only the stated noise is left.
-    ``correlation`` (n, n) follows the order of ``parameters``. ``converged`` and ``stopped`` tell how the
-    evolution ended, ``polished`` how the least-squares polish did (empty if there was none).
+    ``cost``: equation 6 at the estimate, ``also`` the same with other error functions; ``cost_per_sample`` is 1
+    when only the stated noise is left. ``correlation`` (n, n) follows the order of ``parameters``. ``converged``
+    and ``stopped`` tell how the evolution ended, ``polished`` how the least-squares polish did (empty: none).
     """
 
     label: str
@@ -66,6 +66,7 @@ class PointResult:
     cost: float
     cost_per_sample: float
     terms: Mapping[str, float]
+    also: Mapping[str, float]
     generations: tuple[Generation, ...]
     evaluations: int
     converged: bool

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from thsa_cosim.identify.interleave import interleave
 from thsa_cosim.identify.over_temperature import fit_laws, values_at
 from thsa_cosim.identify.parameter_set import parameter_set
 from thsa_cosim.identify.point import PointSearch, search_point
-from thsa_cosim.identify.problem import Case, PointProblem, build_case, build_point
+from thsa_cosim.identify.problem import Case, Given, PointProblem, build_case, build_point
 from thsa_cosim.identify.results import Comparison, IdentifyResult, LawResult, PointResult, Progress
 from thsa_cosim.identify.study import open_study
 from thsa_cosim.recordings import Recording
@@ -34,11 +34,13 @@ def identify(
     workers: int = 1,
     cluster: str | None = None,
     on_progress: OnProgress | None = None,
+    given: Mapping[float | None, Given] | None = None,
 ) -> IdentifyResult:
     """Identify the scenario's parameters in the study folder ``folder``; continue what it holds.
 
     A KeyboardInterrupt ends the study early: the result then has the status "interrupted" and the points
     that were finished. The same call continues it, and ends with what an undisturbed run would have found.
+    ``given``: per temperature, how sure the start values are that earlier stages found; it widens the errors.
 
     Raises
     ------
@@ -47,7 +49,8 @@ def identify(
     StudyError
         If no point could be identified because every simulation failed.
     """
-    points = [build_point(scenario, point) for point in scenario.points]
+    known = given or {}
+    points = [build_point(scenario, p, known.get(p.temperature_degC)) for p in scenario.points]
     held_out = _held_out_cases(scenario)
     open_study(folder, study_identity(scenario))
     names = tuple(dict.fromkeys(name for point in points for name in point.space.names))

@@ -51,8 +51,10 @@ class ProgressDisplay:
 
     def __call__(self, progress: Progress) -> None:
         """Show ``progress``, unless something was shown a moment ago."""
-        self._last = progress
         now = time.monotonic()
+        if self._last is None or progress.stage != self._last.stage:
+            self._begin = now  # rate and time left are those of the stage
+        self._last = progress
         if self._quiet or now - self._shown < (LINE_EVERY if self._bar is None else BAR_EVERY):
             return
         self._shown = now

@@ -118,6 +118,7 @@ def _point(point: PointResult) -> dict[str, Any]:
         "cost": point.cost,
         "cost_per_sample": point.cost_per_sample,
         "terms": dict(point.terms),
+        "also": dict(point.also),
         "evaluations": point.evaluations,
         "converged": point.converged,
         "stopped": point.stopped,

@@ -20,6 +20,7 @@ from thsa_cosim.search.uncertainty import (
     Uncertainty,
     estimate_uncertainty,
     long_run_covariance,
+    with_given,
 )
 
 __all__ = [
@@ -35,4 +36,5 @@ __all__ = [
     "evolve",
     "long_run_covariance",
     "polish",
+    "with_given",
 ]

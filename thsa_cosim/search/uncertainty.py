@@ -8,7 +8,7 @@ white noise, A⁻¹ Σ_c σ_c² J_cᵀ J_c A⁻¹, the latter is reported: kerne
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,3 +157,21 @@ def _correlation(covariance: FloatArray) -> FloatArray:
         size = np.sqrt(np.diag(covariance))
         matrix = covariance / np.outer(size, size)
     return np.where(np.isfinite(matrix), np.clip(matrix, -1.0, 1.0), np.nan)
+
+
+def with_given(
+    uncertainty: Uncertainty, jacobian: FloatArray, given_jacobian: FloatArray, given_covariance: FloatArray
+) -> Uncertainty:
+    """Add what comes from values that were held, but are themselves uncertain.
+
+    ``jacobian`` (N, n) by the estimated parameters, ``given_jacobian`` (N, m) by the held ones, whose
+    covariance is ``given_covariance`` (m, m). A held value that is off by δ shifts a least-squares estimate by
+    -(JᵀJ)⁻¹ Jᵀ J_g δ (implicit function theorem), which adds S C Sᵀ to its covariance.
+    """
+    known = [i for i, stderr in enumerate(uncertainty.stderr) if np.isfinite(stderr)]
+    covariance = uncertainty.covariance.copy()
+    if known and given_jacobian.shape[1]:
+        shift = -np.linalg.lstsq(jacobian[:, known], given_jacobian, rcond=1e-10)[0]
+        covariance[np.ix_(known, known)] += shift @ given_covariance @ shift.T
+    stderr = np.sqrt(np.diag(covariance))
+    return replace(uncertainty, covariance=covariance, stderr=stderr, correlation=_correlation(covariance))

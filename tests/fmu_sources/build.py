@@ -1,47 +1,175 @@
 """Build the test FMUs: compile a C source, write its modelDescription.xml, zip both."""
 
+import atexit
 import importlib.util
 import shutil
 import subprocess
 import sys
+import tempfile
 import zipfile
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+
+import pytest
 
 SOURCES = Path(__file__).parent
 
 FAULTS = {
-    name: number
-    for number, name in enumerate(
-        [
-            "none",
-            "segfault",
-            "abort",
-            "exit",
-            "hang",
-            "init_hang",
-            "error",
-            "fatal",
-            "discard",
-            "nan",
-            "inf",
-            "short",
-            "memory",
-            "flood",
-            "files",
-            "pending",
-            "free_crash",
-            "init_crash",
-            "init_error",
-            "child",
-            "slow",
-            "term_error",
-            "leak",
-            "chdir",
-        ]
-    )
+    "none": 0,
+    "segfault": 1,
+    "abort": 2,
+    "exit": 3,
+    "hang": 4,
+    "init_hang": 5,
+    "error": 6,
+    "fatal": 7,
+    "discard": 8,
+    "nan": 9,
+    "inf": 10,
+    "short": 11,
+    "memory": 12,
+    "flood": 13,
+    "files": 14,
+    "pending": 15,
+    "free_crash": 16,
+    "init_crash": 17,
+    "init_error": 18,
+    "child": 19,
+    "slow": 20,
+    "term_error": 21,
+    "leak": 22,
+    "chdir": 23,
+    "shutdown": 24,
 }
 """Values of the parameter ``fault`` of lag2.c."""
+
+LAG2 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Lag" guid="{guid}" generationTool="thsa-cosim tests"
+  numberOfEventIndicators="0">
+ <ModelExchange modelIdentifier="lag2"/>
+ <CoSimulation modelIdentifier="lag2" canHandleVariableCommunicationStepSize="true"
+   canInterpolateInputs="{interpolates}"/>
+ <UnitDefinitions><Unit name="s"><BaseUnit s="1"/></Unit>
+   <Unit name="m/s"><BaseUnit m="1" s="-1"/></Unit></UnitDefinitions>
+ <DefaultExperiment startTime="0" stopTime="1" tolerance="1e-6" stepSize="0.01"/>
+ <ModelVariables>
+  <ScalarVariable name="tau" valueReference="1" causality="parameter" variability="fixed" initial="exact"
+    description="Time constant"><Real start="0.1" unit="s" min="1e-6"/></ScalarVariable>
+  <ScalarVariable name="k" valueReference="2" causality="parameter" variability="tunable" initial="exact">
+    <Real start="1"/></ScalarVariable>
+  <ScalarVariable name="y" valueReference="3" causality="output" variability="continuous" initial="exact">
+    <Real start="0" unit="m/s"/></ScalarVariable>
+  <ScalarVariable name="u" valueReference="4" causality="input" variability="continuous">
+    <Real start="0" unit="m/s"/></ScalarVariable>
+  <ScalarVariable name="feed" valueReference="5" causality="output" variability="continuous"
+    initial="calculated"><Real unit="m/s"/></ScalarVariable>
+  <ScalarVariable name="fault" valueReference="6" causality="parameter" variability="fixed" initial="exact">
+    <Real start="0"/></ScalarVariable>
+  <ScalarVariable name="at" valueReference="7" causality="parameter" variability="fixed" initial="exact">
+    <Real start="0.5" unit="s"/></ScalarVariable>
+  <ScalarVariable name="der(y)" valueReference="8" causality="local" variability="continuous"
+    initial="calculated"><Real derivative="3"/></ScalarVariable>
+  <ScalarVariable name="steps" valueReference="1" causality="output" variability="discrete"
+    initial="calculated"><Integer/></ScalarVariable>
+  <ScalarVariable name="offset" valueReference="2" causality="input" variability="discrete">
+    <Integer start="0"/></ScalarVariable>
+  <ScalarVariable name="above" valueReference="1" causality="output" variability="discrete"
+    initial="calculated"><Boolean/></ScalarVariable>
+  <ScalarVariable name="invert" valueReference="2" causality="input" variability="discrete">
+    <Boolean start="false"/></ScalarVariable>
+ </ModelVariables>
+ <ModelStructure>
+  <Outputs><Unknown index="3"/><Unknown index="5"/><Unknown index="9"/><Unknown index="11"/></Outputs>
+  <Derivatives><Unknown index="8"/></Derivatives>
+  <InitialUnknowns><Unknown index="5"/><Unknown index="8"/><Unknown index="9"/><Unknown index="11"/>
+  </InitialUnknowns>
+ </ModelStructure>
+</fmiModelDescription>
+"""
+
+LAG3 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="Lag3" instantiationToken="{{lag3}}">
+ <ModelExchange modelIdentifier="lag3" providesDirectionalDerivatives="true"/>
+ <CoSimulation modelIdentifier="lag3" canHandleVariableCommunicationStepSize="true"
+   providesIntermediateUpdate="{updates}"/>
+ <DefaultExperiment startTime="0" stopTime="1" tolerance="1e-6"/>
+ <ModelVariables>
+  <Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
+  <Float64 name="tau" valueReference="1" causality="parameter" variability="fixed" start="0.1"/>
+  <Float64 name="k" valueReference="2" causality="parameter" variability="tunable" start="1"/>
+  <Float64 name="y" valueReference="3" causality="output" variability="continuous" initial="exact" start="0">
+   <Alias name="alias of y"/></Float64>
+  <Float64 name="u" valueReference="4" causality="input" variability="continuous" start="0"
+    intermediateUpdate="{updates}"/>
+  <Float64 name="feed" valueReference="5" causality="output" variability="continuous"/>
+  <Float64 name="der(y)" valueReference="6" causality="local" variability="continuous" derivative="3"/>
+  <Float64 name="stop_at" valueReference="7" causality="parameter" variability="fixed" start="1e300"/>
+  <Int32 name="count" valueReference="8" causality="output" variability="discrete"/>
+  <Boolean name="flag" valueReference="9" causality="input" variability="discrete" start="false"/>
+  <Float32 name="single" valueReference="10" causality="input" variability="continuous" start="0"/>
+  <Float64 name="z" valueReference="11" causality="local" variability="continuous"/>
+  <Int32 name="fault" valueReference="12" causality="parameter" variability="fixed" start="0"/>
+  <Float64 name="vector" valueReference="13" causality="parameter" variability="fixed" start="0 0">
+   <Dimension start="2"/></Float64>
+ </ModelVariables>
+ <ModelStructure>
+  <Output valueReference="3"/><Output valueReference="5"/><Output valueReference="8"/>
+  <ContinuousStateDerivative valueReference="6"/>
+  <InitialUnknown valueReference="5"/><InitialUnknown valueReference="6"/><InitialUnknown valueReference="8"/>
+  <EventIndicator valueReference="11"/>
+ </ModelStructure>
+</fmiModelDescription>
+"""
+
+EVENTS2 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Ball" guid="{events}" numberOfEventIndicators="1">
+ <ModelExchange modelIdentifier="events2"/>
+ <ModelVariables>
+  <ScalarVariable name="h" valueReference="1" causality="output" initial="exact"><Real start="1"/>
+  </ScalarVariable>
+  <ScalarVariable name="v" valueReference="2" causality="output" initial="exact"><Real start="0" reinit="true"/>
+  </ScalarVariable>
+  <ScalarVariable name="a" valueReference="3"><Real derivative="2"/></ScalarVariable>
+  <ScalarVariable name="e" valueReference="4" causality="parameter" variability="fixed"><Real start="0.7"/>
+  </ScalarVariable>
+  <ScalarVariable name="kick" valueReference="5" causality="parameter" variability="fixed">
+   <Real start="1e300"/></ScalarVariable>
+  <ScalarVariable name="dv" valueReference="6" causality="parameter" variability="fixed"><Real start="0"/>
+  </ScalarVariable>
+  <ScalarVariable name="ceiling" valueReference="7" causality="parameter" variability="fixed">
+   <Real start="1e300"/></ScalarVariable>
+  <ScalarVariable name="end" valueReference="8" causality="parameter" variability="fixed">
+   <Real start="1e300"/></ScalarVariable>
+  <ScalarVariable name="dh" valueReference="9"><Real derivative="1"/></ScalarVariable>
+  <ScalarVariable name="bounces" valueReference="1" causality="output" variability="discrete"><Integer/>
+  </ScalarVariable>
+  <ScalarVariable name="steps" valueReference="2" causality="output" variability="discrete"><Integer/>
+  </ScalarVariable>
+  <ScalarVariable name="off" valueReference="1" causality="input" variability="discrete">
+   <Boolean start="false"/></ScalarVariable>
+ </ModelVariables>
+ <ModelStructure>
+  <Outputs><Unknown index="1"/><Unknown index="2"/><Unknown index="10"/><Unknown index="11"/></Outputs>
+  <Derivatives><Unknown index="9"/><Unknown index="3"/></Derivatives>
+ </ModelStructure>
+</fmiModelDescription>
+"""
+
+LAG1 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="1.0" modelName="Lag1" modelIdentifier="lag1" guid="{lag1}"
+  numberOfContinuousStates="0" numberOfEventIndicators="0">
+ <ModelVariables>
+  <ScalarVariable name="tau" valueReference="1" variability="parameter"><Real start="0.1"/></ScalarVariable>
+  <ScalarVariable name="y" valueReference="2" causality="output"><Real/></ScalarVariable>
+  <ScalarVariable name="u" valueReference="3" causality="input"><Real start="0"/></ScalarVariable>
+  <ScalarVariable name="steps" valueReference="1" causality="output" variability="discrete"><Integer/>
+  </ScalarVariable>
+ </ModelVariables>
+ <Implementation><CoSimulation_StandAlone><Capabilities canHandleVariableCommunicationStepSize="true"/>
+ </CoSimulation_StandAlone></Implementation>
+</fmiModelDescription>
+"""
 
 
 def compiler() -> list[str] | None:
@@ -62,99 +190,73 @@ def headers() -> Path:
     return Path(found.origin).parent / "c-code"
 
 
-LAG2_VARIABLES = """
-  <ScalarVariable name="tau" valueReference="1" causality="parameter" variability="fixed" initial="exact"
-    description="Time constant"><Real start="0.1" unit="s" min="1e-6"/></ScalarVariable>
-  <ScalarVariable name="k" valueReference="2" causality="parameter" variability="tunable" initial="exact">
-    <Real start="1"/></ScalarVariable>
-  <ScalarVariable name="y" valueReference="3" causality="output" variability="continuous" initial="exact">
-    <Real start="0" unit="m/s"/></ScalarVariable>
-  <ScalarVariable name="u" valueReference="4" causality="input" variability="continuous">
-    <Real start="0" unit="m/s"/></ScalarVariable>
-  <ScalarVariable name="feed" valueReference="5" causality="output" variability="continuous" initial="calculated">
-    <Real unit="m/s"/></ScalarVariable>
-  <ScalarVariable name="fault" valueReference="6" causality="parameter" variability="fixed" initial="exact">
-    <Real start="0"/></ScalarVariable>
-  <ScalarVariable name="at" valueReference="7" causality="parameter" variability="fixed" initial="exact">
-    <Real start="0.5" unit="s"/></ScalarVariable>
-  <ScalarVariable name="der(y)" valueReference="8" causality="local" variability="continuous" initial="calculated">
-    <Real derivative="3"/></ScalarVariable>
-  <ScalarVariable name="steps" valueReference="1" causality="output" variability="discrete" initial="calculated">
-    <Integer/></ScalarVariable>
-  <ScalarVariable name="offset" valueReference="2" causality="input" variability="discrete">
-    <Integer start="0"/></ScalarVariable>
-  <ScalarVariable name="above" valueReference="1" causality="output" variability="discrete" initial="calculated">
-    <Boolean/></ScalarVariable>
-  <ScalarVariable name="invert" valueReference="2" causality="input" variability="discrete">
-    <Boolean start="false"/></ScalarVariable>
-"""
+@cache
+def _folder() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="thsa-cosim-test-fmus-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
-def lag2_xml(*, interpolates: bool = True, model_exchange: bool = True, guid: str = "{lag}") -> str:
-    """Model description of lag2.c."""
-    exchange = '<ModelExchange modelIdentifier="lag2" canBeInstantiatedOnlyOncePerProcess="false"/>'
-    return f"""<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="Lag" guid="{guid}" generationTool="thsa-cosim tests"
-  numberOfEventIndicators="0">
- {exchange if model_exchange else ""}
- <CoSimulation modelIdentifier="lag2" canHandleVariableCommunicationStepSize="true"
-   canInterpolateInputs="{str(interpolates).lower()}"/>
- <UnitDefinitions><Unit name="s"><BaseUnit s="1"/></Unit>
-   <Unit name="m/s"><BaseUnit m="1" s="-1"/></Unit></UnitDefinitions>
- <DefaultExperiment startTime="0" stopTime="1" tolerance="1e-6" stepSize="0.01"/>
- <ModelVariables>{LAG2_VARIABLES}</ModelVariables>
- <ModelStructure>
-  <Outputs><Unknown index="3"/><Unknown index="5"/><Unknown index="9"/><Unknown index="11"/></Outputs>
-  <Derivatives><Unknown index="8"/></Derivatives>
-  <InitialUnknowns><Unknown index="5"/><Unknown index="8"/><Unknown index="9"/><Unknown index="11"/>
-  </InitialUnknowns>
- </ModelStructure>
-</fmiModelDescription>
-"""
-
-
-def build_library(source: str, folder: Path, *defines: str) -> Path:
-    """Compile one source of this folder to a shared library in ``folder``."""
+@cache
+def library(source: str, *defines: str) -> Path:
+    """Compile a source of this folder; the calling test is skipped where there is no compiler."""
     command = compiler()
-    assert command is not None
-    library = folder / f"{Path(source).stem}{'_'.join(['', *defines])}.so"
-    if not library.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        subprocess.run(
-            [
-                *command,
-                "-std=gnu11",
-                "-O2",
-                "-shared",
-                "-fPIC",
-                f"-I{headers()}",
-                *(f"-D{d}" for d in defines),
-                str(SOURCES / source),
-                "-o",
-                str(library),
-                "-lm",
-            ],
-            check=True,
-            capture_output=True,
-            timeout=120,
-        )
-    return library
+    if command is None:
+        pytest.skip("no C compiler (gcc, cc, clang or the ziglang package)")
+    if sys.platform != "linux":
+        pytest.skip("the test FMUs are built for Linux only")
+    target = _folder() / f"{Path(source).stem}{'_'.join(['', *defines])}.so"
+    options = ["-std=gnu11", "-O2", "-shared", "-fPIC", f"-I{headers()}", *(f"-D{d}" for d in defines)]
+    subprocess.run(
+        [*command, *options, str(SOURCES / source), "-o", str(target), "-lm"],
+        check=True,
+        capture_output=True,
+        timeout=120,
+    )
+    return target
 
 
 def write_fmu(
-    path: Path,
-    xml: str,
-    library: Path,
-    identifier: str,
-    *,
-    platform: str = "linux64",
-    extra: Mapping[str, bytes] = {},
+    path: Path, xml: str, binary: Path, identifier: str, extra: Mapping[str, bytes] | None = None
 ) -> Path:
     """Zip a model description and a library to an FMU; ``extra`` adds entries under any name."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    platform = "x86_64-linux" if 'fmiVersion="3.0"' in xml else "linux64"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("modelDescription.xml", xml)
-        archive.write(library, f"binaries/{platform}/{identifier}.so")
-        for name, content in extra.items():
+        archive.write(binary, f"binaries/{platform}/{identifier}.so")
+        for name, content in (extra or {}).items():
             archive.writestr(name, content)
     return path
+
+
+@cache
+def lag2(*defines: str, interpolates: bool = True, guid: str = "{lag}") -> Path:
+    """The first-order lag of lag2.c, FMI 2.0."""
+    name = (
+        "lag2"
+        + "_".join(["", *defines])
+        + ("" if interpolates else "_held")
+        + ("" if guid == "{lag}" else "_bad")
+    )
+    xml = LAG2.format(guid=guid, interpolates=str(interpolates).lower())
+    return write_fmu(_folder() / f"{name}.fmu", xml, library("lag2.c", *defines), "lag2")
+
+
+@cache
+def lag3(*, updates: bool = True) -> Path:
+    """The first-order lag of lag3.c, FMI 3.0."""
+    name = "lag3" if updates else "lag3_held"
+    xml = LAG3.format(updates=str(updates).lower())
+    return write_fmu(_folder() / f"{name}.fmu", xml, library("lag3.c"), "lag3")
+
+
+@cache
+def events2() -> Path:
+    """The bouncing ball of events2.c, FMI 2.0 Model Exchange."""
+    return write_fmu(_folder() / "events2.fmu", EVENTS2, library("events2.c"), "events2")
+
+
+@cache
+def lag1() -> Path:
+    """The first-order lag of lag1.c, FMI 1.0 Co-Simulation."""
+    return write_fmu(_folder() / "lag1.fmu", LAG1, library("lag1.c"), "lag1")

@@ -19,7 +19,7 @@ enum { VR_STEPS = 1, VR_OFFSET };                                               
 enum { VR_ABOVE = 1, VR_INVERT };                                                  /* Boolean */
 enum {
     NONE, SEGFAULT, ABORT, EXIT, HANG, INIT_HANG, ERROR, FATAL, DISCARD, NOT_A_NUMBER, INFINITE, SHORT, MEMORY,
-    FLOOD, FILES, PENDING, FREE_CRASH, INIT_CRASH, INIT_ERROR, CHILD, SLOW, TERM_ERROR, LEAK, CHDIR
+    FLOOD, FILES, PENDING, FREE_CRASH, INIT_CRASH, INIT_ERROR, CHILD, SLOW, TERM_ERROR, LEAK, CHDIR, SHUTDOWN
 };
 
 typedef struct {
@@ -40,11 +40,14 @@ static void start(Model* m) {
     m->stop = 1e300;
 }
 
+static volatile int* volatile nowhere;
+static void crash(void) { *nowhere = 1; }
+
 static void hang(void) {
     for (;;) sink += 1.0;
 }
 
-fmi2Status fmi2Discard_(Model* m, double t) {
+static fmi2Status refuse(Model* m, double t) {
     m->last = t;
     m->callbacks->logger(NULL, "lag", fmi2Discard, "logStatusDiscard", "step refused at t = %g in %s", t, "lag");
     return fmi2Discard;
@@ -52,7 +55,7 @@ fmi2Status fmi2Discard_(Model* m, double t) {
 
 static fmi2Status misbehave(Model* m, double t, double h) {
     switch ((int)m->fault) {
-        case SEGFAULT: *(volatile int*)8 = 1; break;
+        case SEGFAULT: crash(); break;
         case ABORT: fprintf(stderr, "lag: assertion failed\n"); abort();
         case EXIT: exit(3);
         case HANG: hang(); break;
@@ -60,10 +63,10 @@ static fmi2Status misbehave(Model* m, double t, double h) {
             m->callbacks->logger(NULL, "lag", fmi2Error, "logStatusError", "solver failed with %d in %s", 42, "lag");
             return fmi2Error;
         case FATAL: return fmi2Fatal;
-        case DISCARD: return fmi2Discard_(m, t);
+        case DISCARD: return refuse(m, t);
         case NOT_A_NUMBER: m->x = NAN; break;
         case INFINITE: m->x = INFINITY; break;
-        case SHORT: m->fell_short = 1; return fmi2Discard_(m, t);
+        case SHORT: m->fell_short = 1; return refuse(m, t);
         case MEMORY:
             for (;;) {
                 size_t n = 1 << 20;
@@ -93,6 +96,7 @@ static fmi2Status misbehave(Model* m, double t, double h) {
             memset(block, 1, 4 << 20);
             break;
         }
+        case SHUTDOWN: kill(getpid(), SIGTERM); break;
         case CHDIR: if (chdir("/")) return fmi2Error; break;
         default: break;
     }
@@ -113,7 +117,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     hang();
 #endif
 #ifdef CRASH_INSTANTIATE
-    raise(SIGSEGV);
+    crash();
 #endif
     if (strcmp(guid, "{lag}")) {
         functions->logger(NULL, "lag", fmi2Error, "logStatusError", "wrong GUID %s", guid);
@@ -127,7 +131,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 
 void fmi2FreeInstance(fmi2Component c) {
     Model* m = c;
-    if ((int)m->fault == FREE_CRASH) raise(SIGSEGV);
+    if ((int)m->fault == FREE_CRASH) crash();
     m->callbacks->freeMemory(m);
 }
 
@@ -143,7 +147,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerant, fmi2Real t
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
     Model* m = c;
     if ((int)m->fault == INIT_HANG) hang();
-    if ((int)m->fault == INIT_CRASH) raise(SIGSEGV);
+    if ((int)m->fault == INIT_CRASH) crash();
     return (int)m->fault == INIT_ERROR ? fmi2Error : fmi2OK;
 }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) { (void)c; return fmi2OK; }

@@ -4,6 +4,7 @@ import hashlib
 import shutil
 import stat
 import zipfile
+import zlib
 from pathlib import Path, PurePosixPath
 
 from thsa_cosim.errors import FmuError
@@ -62,7 +63,14 @@ def unpack(path: Path, folder: Path) -> Path:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             archive.extractall(folder)
-        except (zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError, EOFError) as error:
+        except (
+            zipfile.BadZipFile,
+            zlib.error,
+            OSError,
+            NotImplementedError,
+            RuntimeError,
+            EOFError,
+        ) as error:
             shutil.rmtree(folder, ignore_errors=True)
             raise FmuError(f"{path} cannot be unpacked ({error}).") from None
     return folder

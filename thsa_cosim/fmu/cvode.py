@@ -64,7 +64,8 @@ class Cvode:
         self._sun, self._library, self._core = sun, sundials_cvode, sundials_core
         n = len(states)
         self._n, self._root_count = n, root_count
-        self._failure: SimulationFailure | None = None
+        self.failure: SimulationFailure | None = None
+        """What the right-hand side last refused, also if the step was then repeated with success."""
         self._error: BaseException | None = None
         self._rhs, self._roots, self._jacobian = rhs, roots, jacobian
         pointer, real = ctypes.c_void_p, ctypes.c_double
@@ -127,7 +128,7 @@ class Cvode:
         try:
             function()
         except SimulationFailure as failure:
-            self._failure = failure
+            self.failure = failure
             recoverable = failure.status in (Status.FMI_DISCARD, Status.NOT_FINITE)
             return 1 if recoverable else -1
         except BaseException as error:
@@ -158,13 +159,12 @@ class Cvode:
         """
         pointer, real = ctypes.c_void_p, ctypes.c_double
         self._call(self._library, "CVodeSetStopTime", (pointer, real), self._memory, stop)
-        self._failure = None
         flag = self._sun.CVode(self._memory, stop, self._x, ctypes.byref(self._time), _ONE_STEP)
         if self._error is not None:
             raise self._error
         if flag < 0:
-            if self._failure is not None:
-                raise self._failure
+            if self.failure is not None:
+                raise self.failure
             why = _REASONS.get(flag, f"code {flag}")
             reason = f"the integrator CVODE gave up at t = {self._time.value:.9g} s: {why}"
             raise SimulationFailure(Status.INCOMPLETE, reason)

@@ -140,7 +140,10 @@ def read_description(path: Path | str) -> FmuDescription:
             raise FmuError(f"{path}: modelDescription.xml cannot be unpacked ({error}).") from None
     try:
         # Many vendor FMUs break the schema in harmless ways; `thsa-cosim check` reports those.
-        raw = read_model_description(str(path), validate=False)
+        # fmpy gets an open file, as it does not close what it opens when it raises.
+        with path.open("rb") as file:
+            raw = read_model_description(file, validate=False)
+            platforms = tuple(sorted(fmpy.supported_platforms(file)))
     except Exception as error:
         message = " ".join(str(error).split()) or type(error).__name__
         raise FmuError(f"{path}: modelDescription.xml cannot be read ({message.rstrip('.')}).") from None
@@ -168,7 +171,7 @@ def read_description(path: Path | str) -> FmuDescription:
             tolerance=_number(experiment.tolerance),
             step=_number(experiment.stepSize),
         ),
-        platforms=tuple(sorted(fmpy.supported_platforms(str(path)))),
+        platforms=platforms,
         co_simulation_identifier=getattr(co_simulation, "modelIdentifier", None),
         model_exchange_identifier=getattr(model_exchange, "modelIdentifier", None),
         states=len(raw.derivatives) or int(raw.numberOfContinuousStates or 0),

@@ -22,6 +22,9 @@ from thsa_cosim.signals import FloatArray, Signals
 _SAFETY = 0.1
 """Local errors are held this much below the tolerance, so that global errors come out near it."""
 _EVENTS_AT_ONE_TIME = 200
+_CRAWL = 1e-9
+_CRAWLING_STEPS = 1000
+"""So many steps in a row below _CRAWL of the simulated time: the solver creeps up to a point without end."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,9 @@ def segments(plan: Plan) -> list[Segment]:
     for a, b in zip(starts, [*starts[1:], len(times) - 1], strict=True):
         slope = np.where(linear, (table[b] - table[a]) / (times[b] - times[a]), 0.0)
         result.append(Segment(float(times[a]), float(times[b]), table[a], slope, bool(jumps[a])))
+    if t1 > t0 and (table[-1] != table[-2])[~linear].any():
+        # A held input that jumps at the very end: the last row of outputs belongs to its new value.
+        result.append(Segment(t1, t1, table[-1], np.zeros(len(linear)), True))
     return result
 
 
@@ -199,7 +205,7 @@ class _Run:
         try:
             self.record(t, solver.states)
             signs = self.signs()
-            here = 0
+            here = crawled = 0
             while t < t1 - slack and not self.ends:
                 stop = min(self.segment.stop, t1)
                 if self.next_event is not None:
@@ -211,6 +217,10 @@ class _Run:
                     t, is_root = solver.step(stop)
                 else:
                     t, is_root = stop, False
+                crawled = crawled + 1 if t - before < _CRAWL * (t1 - float(times[0])) else 0
+                if crawled > _CRAWLING_STEPS:
+                    reason = f"the integrator does not get past t = {t:.9g} s"
+                    raise solver.failure or SimulationFailure(Status.INCOMPLETE, reason)
                 while self.next_row < len(times) and times[self.next_row] < t - slack:
                     self.record(float(times[self.next_row]), solver.at(float(times[self.next_row])))
                 self.place(t, solver.states)

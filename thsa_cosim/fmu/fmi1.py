@@ -1,5 +1,6 @@
 """FMI 1.0 Co-Simulation through fmpy; linear inputs are held at their mean over each step."""
 
+import ctypes
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,10 @@ def run_fmi1(
     except Exception as error:
         reason = f"{description.path.name} cannot be loaded: {' '.join(str(error).split())}"
         raise SimulationFailure(Status.LOAD_ERROR, reason) from None
+    # fmpy 0.3.32 declares that doStep and others return strings: an error code would be read as an address.
+    for name, function in slave._functions.items():
+        if function.restype is ctypes.c_char_p and name not in ("fmi1GetVersion", "fmi1GetTypesPlatform"):
+            function.restype = ctypes.c_int
     try:
         progress[0] = Phase.INSTANTIATE
         slave.instantiate(loggingOn=False)

@@ -42,14 +42,14 @@ def export_fmu(
     start_values:
         Start values of parameters that replace those of the model, in the model's units.
     platforms:
-        Targets to compile for, as folders of FMI 3.0 (``x86_64-linux``, …); default all.
+        What to compile for, by the names of FMI 2.0 or 3.0 (``win64``, ``x86_64-linux``, …); default all.
 
     Raises
     ------
     ModelicaError
         The class does not compile or is outside the supported subset; the message names the equation or variable.
     ParameterError
-        A start value names no parameter of the model.
+        A start value names no parameter of the model, or a platform is unknown.
     MissingExtraError
         rumoca, CasADi or ziglang is not installed.
     """
@@ -81,7 +81,16 @@ def export_fmu(
             for v in causal.variables
         )
         causal = dataclasses.replace(causal, variables=variables)
-    chosen = [p for p in PLATFORMS if platforms is None or p.fmi3 in platforms]
+    chosen = list(PLATFORMS)
+    if platforms is not None:
+        names = {name: p for p in PLATFORMS for name in (p.fmi2, p.fmi3) if name}
+        for name in platforms:
+            if name not in names:
+                listed = ", ".join(names)
+                raise ParameterError(
+                    f"Platform {name!r} is unknown; choose from {listed}.{did_you_mean(name, names)}"
+                )
+        chosen = [p for p in PLATFORMS if p in [names[name] for name in platforms]]
     if output is None:
         output = Path(causal.flat.name.rsplit(".", 1)[-1] + ".fmu")
     date = float(os.environ.get("SOURCE_DATE_EPOCH", time.time()))

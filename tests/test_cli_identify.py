@@ -110,7 +110,16 @@ def test_the_study_folder_holds_readable_tables_and_plots(study) -> None:
     assert identified.values["motor.R_s.a1"] == result["laws"]["R_s"]["coefficients"][1]
     assert identified.units["motor.R_s.a0"] == "Ohm"
     plots = {p.name for p in (folder / "plots").iterdir()}
-    assert {"law_R_s.png", "fit_motor_m30.png", "validate_motor_m10.png", "convergence.png"} <= plots
+    friction = pd.read_csv(folder / "friction_motor.csv")
+    at_rest = friction[(friction["speed [rad/s]"] == 0.0) & (friction["temperature_degC"] == -30.0)]
+    assert at_rest["friction [N.m]"].item() == pytest.approx(result["laws"]["T_fm"]["at"]["-30.0"])
+    assert {
+        "friction_motor.png",
+        "law_R_s.png",
+        "fit_motor_m30.png",
+        "validate_motor_m10.png",
+        "convergence.png",
+    } <= plots
 
 
 def test_tables_are_printed_plainly_into_a_pipe(study) -> None:

@@ -157,6 +157,7 @@ def point(temperature: float | None, **values: float) -> PointResult:
         cost_per_sample=1.0,
         terms={},
         also={},
+        profiles={},
         generations=(),
         evaluations=1,
         converged=True,

@@ -5,6 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from thsa_cosim.search import (
+    CHI2_95,
     STRATEGIES,
     EvolutionSettings,
     Generation,
@@ -13,6 +14,7 @@ from thsa_cosim.search import (
     evolve,
     long_run_covariance,
     polish,
+    profile,
     with_given,
 )
 
@@ -301,3 +303,35 @@ def test_uncertain_held_values_widen_the_errors_as_simulated() -> None:
         assert widened.stderr[1] == pytest.approx(sure.stderr[1], rel=1e-6)
     assert np.std(found, axis=0) == pytest.approx(np.mean(stated, axis=0), rel=0.3)
     assert np.mean(stated, axis=0)[0] > 0.05
+
+
+def test_the_profile_of_a_linear_model_is_its_standard_error() -> None:
+    def model(u: np.ndarray) -> np.ndarray:
+        return u[0] * np.exp(-TIME) + u[1] * np.exp(-0.5 * TIME)
+
+    measured = model(np.array([0.5, 0.4])) + 0.1 * noise(8)
+    result, _ = fitted(model, measured, start=(0.4, 0.4))
+    plain = np.sqrt(np.diag(np.linalg.inv(result.jacobian.T @ result.jacobian)))
+    found = profile(
+        lambda v: [(model(u) - measured) / 0.1 for u in v],
+        result.best,
+        0,
+        float(plain[0]),
+        CHI2_95,
+        PolishSettings(),
+    )
+    assert found.upper - result.best[0] == pytest.approx(1.96 * plain[0], rel=1e-3)
+    assert result.best[0] - found.lower == pytest.approx(1.96 * plain[0], rel=1e-3)
+    rise = (found.positions - result.best[0]) ** 2 / plain[0] ** 2
+    np.testing.assert_allclose(found.costs - found.costs.min(), rise, rtol=1e-3, atol=1e-6)
+
+
+def test_a_one_sided_profile_says_so() -> None:
+    """Only u > 0.5 shows: below, the cost is flat, and the interval has no lower end."""
+
+    def evaluate(vectors: np.ndarray) -> list[np.ndarray]:
+        return [np.array([10.0 * max(u[0] - 0.5, 0.0), 1.0]) for u in vectors]
+
+    found = profile(evaluate, np.array([0.5]), 0, 0.1, CHI2_95, PolishSettings())
+    assert np.isnan(found.lower)
+    assert found.upper == pytest.approx(0.5 + np.sqrt(CHI2_95) / 10.0, rel=1e-6)

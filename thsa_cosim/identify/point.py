@@ -8,8 +8,9 @@ import numpy as np
 from thsa_cosim.costs import TermsReducer
 from thsa_cosim.identify.evaluate import Reply, Request, Want
 from thsa_cosim.identify.problem import Given, PointProblem
-from thsa_cosim.identify.results import Estimate, PointResult
+from thsa_cosim.identify.results import Estimate, PointResult, ProfileCurve
 from thsa_cosim.search import (
+    CHI2_95,
     EvolutionSettings,
     Generation,
     PolishSettings,
@@ -17,6 +18,7 @@ from thsa_cosim.search import (
     estimate_uncertainty,
     evolve,
     polish,
+    profile,
     with_given,
 )
 from thsa_cosim.signals import FloatArray, Signals
@@ -67,6 +69,7 @@ def search_point(
             None, (), f"all of the first {settings.population} simulations failed: {last_reason}"
         )
     best, polished = evolution.best, ""
+    profiles: dict[str, ProfileCurve] = {}
     uncertainty: Uncertainty | None = None
     if polishing:
         found = polish(
@@ -89,6 +92,7 @@ def search_point(
             if point.given is not None:
                 shifts = _given_jacobian(point.given, best, found.residual, ask)
                 uncertainty = with_given(uncertainty, found.jacobian, shifts, point.given.covariance)
+            profiles = _profiles(point, best, found.jacobian, uncertainty, ask)
     final = ask(Request(Want.TERMS, best[None, :]))
     signals = ask(Request(Want.SIGNALS, best[None, :])).signals[0]
     if signals is None:
@@ -108,6 +112,7 @@ def search_point(
         cost_per_sample=cost / point.samples,
         terms=terms,
         also=also,
+        profiles=profiles,
         generations=evolution.history,
         evaluations=0,
         converged=evolution.converged,
@@ -115,6 +120,41 @@ def search_point(
         polished=polished,
     )
     return PointSearch(result, signals, "")
+
+
+def _profiles(
+    point: PointProblem, best: FloatArray, jacobian: FloatArray, uncertainty: Uncertainty, ask: Ask
+) -> dict[str, ProfileCurve]:
+    """Profile likelihoods of the parameters that the scenario asks for, in the parameters' units."""
+    curves = {}
+    plain = np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True))
+    for i, parameter in enumerate(point.space.parameters):
+        stderr = float(uncertainty.stderr[i])
+        # A parameter per recording is asked for by the name it was given for all of them.
+        wanted = parameter.name.partition("[")[0] in point.profile or parameter.name in point.profile
+        if not wanted or not np.isfinite(stderr):
+            continue
+        # Residuals that are larger than stated, or correlated, make the same rise of the cost say less.
+        threshold = CHI2_95 * max(1.0, stderr**2 / float(plain[i]))
+        found = profile(
+            lambda vectors: ask(Request(Want.RESIDUALS, vectors)).residuals,
+            best,
+            i,
+            stderr,
+            threshold,
+            PolishSettings(error=point.error),
+        )
+
+        def physical(position: float, i: int = i) -> float | None:
+            moved = best.copy()
+            moved[i] = position
+            return float(point.space.physical(moved)[i]) if np.isfinite(position) else None
+
+        values = np.array([physical(p) for p in found.positions.tolist()], dtype=np.float64)
+        curves[parameter.name] = ProfileCurve(
+            values, found.costs, physical(found.lower), physical(found.upper)
+        )
+    return curves
 
 
 def _total(point: PointProblem, signals: tuple[Signals, ...], error: str) -> float:

@@ -78,6 +78,7 @@ class PointProblem:
     error: str
     also: tuple[str, ...] = ()
     given: Given | None = None
+    profile: tuple[str, ...] = ()
 
     @property
     def channel_names(self) -> tuple[str, ...]:
@@ -160,4 +161,5 @@ def build_point(scenario: Scenario, point: TemperaturePoint, given: Given | None
         error=scenario.cost.error,
         also=tuple(name for name in scenario.cost.also if name != scenario.cost.error),
         given=given,
+        profile=scenario.search.profile,
     )

@@ -26,6 +26,19 @@ class Estimate:
     upper: float
 
 
+@dataclass(frozen=True, eq=False)
+class ProfileCurve:
+    """Least cost (k,) over held ``values`` (k,) of a parameter, and the 95 % interval that it gives.
+
+    ``lower`` and ``upper`` are None on a side on which the cost does not rise far enough.
+    """
+
+    values: FloatArray
+    costs: FloatArray
+    lower: float | None
+    upper: float | None
+
+
 @dataclass(frozen=True)
 class ChannelError:
     """How well a measured signal is met: rmse and noise (1 σ) in ``unit``, nrmse over the measured range."""
@@ -67,6 +80,7 @@ class PointResult:
     cost_per_sample: float
     terms: Mapping[str, float]
     also: Mapping[str, float]
+    profiles: Mapping[str, ProfileCurve]
     generations: tuple[Generation, ...]
     evaluations: int
     converged: bool

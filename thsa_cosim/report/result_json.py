@@ -119,6 +119,14 @@ def _point(point: PointResult) -> dict[str, Any]:
         "cost_per_sample": point.cost_per_sample,
         "terms": dict(point.terms),
         "also": dict(point.also),
+        "profiles": {
+            name: {
+                "values": curve.values.tolist(),
+                "costs": curve.costs.tolist(),
+                "interval_95": [curve.lower, curve.upper],
+            }
+            for name, curve in point.profiles.items()
+        },
         "evaluations": point.evaluations,
         "converged": point.converged,
         "stopped": point.stopped,

@@ -20,6 +20,7 @@ def write_identify(
 ) -> list[Path]:
     """Write result.json, parameters.csv, laws.csv and the plots; return what was written, in order."""
     # matplotlib takes half a second to import: not before the study has run.
+    from thsa_cosim.report.friction import write_friction
     from thsa_cosim.report.plots import file_name, plot_comparison, plot_convergence, plot_law
 
     written: list[Path] = []
@@ -46,6 +47,10 @@ def write_identify(
         path = plots / f"law_{file_name(law.parameter)}.png"
         plot_law(law, result, path)
         note(path)
+    temperatures = [p.temperature_degC for p in result.points if p.temperature_degC is not None]
+    if temperatures:
+        for path in write_friction(folder, result.laws, min(temperatures), max(temperatures)):
+            note(path)
     for comparison in result.comparisons:
         path = plots / f"{comparison.role}_{file_name(comparison.recording)}.png"
         plot_comparison(comparison, path)

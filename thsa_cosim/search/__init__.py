@@ -4,6 +4,8 @@
     the global search with the article's setting.
 ``polish``
     bounded least squares from a good vector, whole Jacobians as one batch.
+``profile``
+    profile likelihood: intervals without the assumption of a parabola.
 ``uncertainty``
     standard errors under autocorrelated residuals, and which parameters the data determine.
 """
@@ -16,6 +18,7 @@ from thsa_cosim.search.differential_evolution import (
     evolve,
 )
 from thsa_cosim.search.polish import PolishResult, PolishSettings, central_jacobian, polish
+from thsa_cosim.search.profile import CHI2_95, Profile, profile
 from thsa_cosim.search.uncertainty import (
     Uncertainty,
     estimate_uncertainty,
@@ -24,17 +27,20 @@ from thsa_cosim.search.uncertainty import (
 )
 
 __all__ = [
+    "CHI2_95",
     "STRATEGIES",
     "EvolutionResult",
     "EvolutionSettings",
     "Generation",
     "PolishResult",
     "PolishSettings",
+    "Profile",
     "Uncertainty",
     "central_jacobian",
     "estimate_uncertainty",
     "evolve",
     "long_run_covariance",
     "polish",
+    "profile",
     "with_given",
 ]

@@ -32,6 +32,8 @@ class PolishSettings:
     cost_tolerance: float = 1e-8
     step_tolerance: float = 1e-7
     error: str = "squared"
+    final_jacobian: bool = True
+    """False saves the evaluations for the Jacobians at the end, where only the minimum is wanted."""
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,9 @@ def polish(evaluate: Residuals, start: FloatArray, settings: PolishSettings) -> 
         return PolishResult(start, None, None, None, evaluations, False, reason)
     best = np.asarray(result.x, dtype=np.float64)
     centre = residual(best)
+    if not settings.final_jacobian:
+        reason = _reason(int(result.status))
+        return PolishResult(best, centre, None, None, evaluations, bool(result.success), reason)
     fine, _ = central_jacobian(residuals_of, best, centre, steps)
     # The same again with half the steps shows how far the differences can be trusted.
     finer, _ = central_jacobian(residuals_of, best, centre, 0.5 * steps)

@@ -69,6 +69,18 @@ def largest_error(found: Signals, expected: dict[str, np.ndarray]) -> float:
     return max(float(np.abs(found[n] - expected[n]).max() / np.ptp(expected[n])) for n in found.names)
 
 
+HELD = Wave(
+    samples(0.45),
+    np.round(np.interp(samples(0.45), [0.05, 0.15, 0.25, 0.4], [0.0, 60.0, 60.0, -30.0]), 1),
+    hold=True,
+)
+
+
+@cache
+def expected_held(widths: Widths) -> dict[str, np.ndarray]:
+    return simulate_motor(rig_at(-55.0), HELD, HELD.times, widths, rtol=1e-9)
+
+
 @cache
 def expected_ramp(widths: Widths) -> dict[str, np.ndarray]:
     return simulate(rig_at(-30.0), RAMP, RAMP_LOAD, samples(1.2005), widths)
@@ -175,14 +187,9 @@ def test_saturated_start_with_held_integrators(motor: Plant) -> None:
 
 
 def test_motor_bench_with_held_commands(motor: Plant) -> None:
-    time = samples(0.8)
-    levels = Wave(
-        time, np.round(np.interp(time, [0.1, 0.2, 0.5, 0.7], [0.0, 60.0, 60.0, -60.0]), 1), hold=True
-    )
-    found = motor.run({}, inputs(time, -55.0, w_cmd=levels), MOTOR_OUTPUTS, time, tolerance=1e-8)
-    expected = simulate_motor(rig_at(-55.0), levels, time, widths_of(motor), rtol=1e-9)
+    found = motor.run({}, inputs(HELD.times, -55.0, w_cmd=HELD), MOTOR_OUTPUTS, HELD.times, tolerance=1e-8)
     # u_q jumps with the command at each sample; both give the value after the jump
-    assert largest_error(found, expected) < 1e-6
+    assert largest_error(found, expected_held(widths_of(motor))) < 1e-6
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=["fmi2", "fmi3"])

@@ -215,3 +215,37 @@ def test_a_model_that_never_runs_is_exit_code_3(tmp_path: Path) -> None:
     assert done.stderr.strip().splitlines()[-1].startswith("error: ")
     assert "no simulation succeeded" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+def test_ten_kills_at_random_moments_change_nothing(study, tmp_path: Path) -> None:
+    """Anything from the first import to the last plot may be cut short, again and again."""
+    scenario, folder, _ = study
+    held_out = ROOT / "scenarios" / "recordings" / "motor_m10.parquet"
+    arguments = ("identify", scenario, "--validate", held_out, "-o", tmp_path / "study", "--workers", 2)
+    random = np.random.default_rng(20)
+    begin = time.monotonic()
+    rows = 0
+    for _ in range(10):
+        process = subprocess.Popen(
+            command(*arguments), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
+        )
+        # Up to what a whole run takes, so that early and late stages are hit alike.
+        try:
+            process.wait(random.uniform(0.2, 12.0))
+        except subprocess.TimeoutExpired:
+            os.kill(process.pid, signal.SIGKILL)
+        _, err = process.communicate(timeout=60)
+        assert process.returncode in (0, -signal.SIGKILL), err
+        journal = tmp_path / "study" / "journal.csv"
+        if journal.exists():
+            found = journal.read_bytes().count(b"\n")
+            assert found >= rows - 1  # a torn last line is dropped, nothing else
+            rows = found
+    done = run(*arguments)
+    assert done.returncode == 0, done.stderr
+    assert result_of(tmp_path / "study") == result_of(folder)
+    table = pd.read_csv(tmp_path / "study" / "journal.csv", float_precision="round_trip")
+    assert not table.duplicated(["stage", "R_s", "psi_pm", "T_fm", "b_m"]).any()
+    assert len(table) == len(pd.read_csv(folder / "journal.csv"))
+    assert time.monotonic() - begin < 400.0

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from thsa_cosim.identify import Progress
     from thsa_cosim.scenario import Scenario, StagedScenario
+    from thsa_cosim.ssv import ParameterSet
 
 PATH = click.Path(path_type=Path)
 
@@ -125,6 +126,11 @@ def _study_options(command: Callable[..., None]) -> Callable[..., None]:
 @cli.command()
 @click.argument("scenario", type=PATH)
 @_study_options
+@click.option(
+    "--export-fmu/--no-export-fmu",
+    default=None,
+    help="Write the FMU anew with what was identified; default: only of a scenario with stages.",
+)
 def identify(
     scenario: Path,
     fit: tuple[Path, ...],
@@ -136,11 +142,13 @@ def identify(
     cluster: str | None,
     quiet: bool,
     as_json: bool,
+    export_fmu: bool | None,
 ) -> None:
     """Identify parameters from recordings as SCENARIO says, point by point over temperature."""
+    from thsa_cosim.report.parameter_files import write_identified_fmu
     from thsa_cosim.report.progress import ProgressDisplay
     from thsa_cosim.report.study import RESULT
-    from thsa_cosim.scenario import Scenario, load_study
+    from thsa_cosim.scenario import Scenario, StagedScenario, load_study
 
     loaded = load_study(scenario, fit=fit, validate=validate, seed=seed, fmu=fmu)
     _check_kind(scenario, loaded.kind, "identify")
@@ -153,14 +161,25 @@ def identify(
             "on_progress": display,
         }
         finish = _identify_one(loaded, options) if isinstance(loaded, Scenario) else _stages(loaded, options)
-    files, status, show = finish
+    files, status, parameters, show = finish
     if status == "interrupted":
         raise _Interrupted(_continue_command("identify", scenario, folder))
+    note = ""
+    if export_fmu or (export_fmu is None and isinstance(loaded, StagedScenario)):
+        target = loaded.stages[-1].scenario.fmu if isinstance(loaded, StagedScenario) else loaded.fmu
+        try:
+            files.append(write_identified_fmu(folder, target, parameters))
+        except ThsaCosimError as error:
+            if export_fmu:
+                raise
+            note = f"note: no FMU with the identified values was written: {error}"
     if as_json:
         click.echo((folder / RESULT).read_text(encoding="utf-8"), nl=False)
     elif not quiet:
         console = _console()
         show(console)
+        if note:
+            console.print(note, highlight=False, markup=False, soft_wrap=True)
         console.print(
             f"\n{len(files)} files in {folder}; the numbers are in {folder / RESULT}", soft_wrap=True
         )
@@ -173,7 +192,7 @@ class _RunOptions(TypedDict):
     on_progress: Callable[["Progress"], None]
 
 
-_Finished = tuple[list[Path], str, Callable[["Console"], None]]
+_Finished = tuple[list[Path], str, "ParameterSet", Callable[["Console"], None]]
 
 
 def _identify_one(scenario: "Scenario", options: _RunOptions) -> _Finished:
@@ -183,7 +202,7 @@ def _identify_one(scenario: "Scenario", options: _RunOptions) -> _Finished:
 
     result = run(scenario, **options)
     files = write_identify(result, options["folder"])
-    return files, result.status, lambda console: print_identify(console, result)
+    return files, result.status, result.parameter_set, lambda console: print_identify(console, result)
 
 
 def _stages(staged: "StagedScenario", options: _RunOptions) -> _Finished:
@@ -192,7 +211,7 @@ def _stages(staged: "StagedScenario", options: _RunOptions) -> _Finished:
 
     result = run_stages(staged, **options)
     files = write_staged(result, options["folder"])
-    return files, result.status, lambda console: print_staged(console, result)
+    return files, result.status, result.parameter_set, lambda console: print_staged(console, result)
 
 
 @cli.command()

@@ -50,6 +50,7 @@ def fit_laws(
             published=published,
             deviation=deviation,
             law_deviation=law_deviation,
+            determined=any(e.identifiable for e in estimates),
         )
     return laws, notes
 

@@ -25,6 +25,9 @@ from thsa_cosim.signals import FloatArray, Signals
 
 Ask = Callable[[Request], Reply]
 
+#: Standard errors that a value must be off zero: with some ten values to a study, two happen by chance.
+CLEAR_OF_ZERO = 3.0
+
 
 @dataclass(frozen=True, eq=False)
 class PointSearch:
@@ -191,8 +194,8 @@ def _estimates(point: PointProblem, best: FloatArray, uncertainty: Uncertainty |
             size = float(uncertainty.stderr[i] * abs(slopes[i]))
             stderr = size if np.isfinite(size) else None
             reason = uncertainty.reasons[i]
-            if not reason and stderr is not None and stderr >= abs(value):
-                reason = f"its standard error {stderr:.2g} {parameter.unit} is as large as its value"
+            if not reason and stderr is not None and CLEAR_OF_ZERO * stderr > abs(value):
+                reason = f"it cannot be told from zero: one standard error is {stderr:.2g} {parameter.unit}"
         estimates[parameter.name] = Estimate(
             value=value,
             unit=parameter.unit,

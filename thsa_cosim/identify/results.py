@@ -102,6 +102,8 @@ class LawResult:
     """Largest distance of the points from the published curve, relative to its largest value."""
     law_deviation: float | None
     """The same for the fitted law at the points' temperatures."""
+    determined: bool = True
+    """False if the data determine the parameter at none of the points: the law is then a fit to noise."""
 
 
 @dataclass(frozen=True)

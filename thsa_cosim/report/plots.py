@@ -54,7 +54,9 @@ def plot_law(law: LawResult, result: IdentifyResult, path: Path) -> None:
     axes.set_xlabel("temperature [°C]")
     axes.set_ylabel(f"{law.parameter} [{law.unit}]")
     title = f"{law.parameter} over temperature"
-    if law.deviation is not None:
+    if not law.determined:
+        title += " (not determined by these data)"
+    elif law.deviation is not None:
         title += f" (largest deviation of the points {100.0 * law.deviation:.2g} %)"
     axes.set_title(title, fontsize=11)
     axes.legend(frameon=False)

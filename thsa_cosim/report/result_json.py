@@ -159,6 +159,7 @@ def _law(law: LawResult, result: IdentifyResult) -> dict[str, Any]:
         "candidates": {candidate.form: candidate.aicc for candidate in law.candidates},
         "covariance": None if law.law.covariance is None else law.law.covariance.tolist(),
         "chi2": law.law.chi2,
+        "identifiable": law.determined,
     }
     if law.law.knots:
         content["knots"] = list(law.law.knots)

@@ -39,8 +39,8 @@ def laws_table(result: IdentifyResult) -> Table:
             law.law.form + (" (chosen)" if law.selected else ""),
             ", ".join(number(c, 3) for c in law.law.coefficients),
             "–" if published is None else ", ".join(number(c, 3) for c in published.coefficients),
-            _percent(law.deviation),
-            _percent(law.law_deviation),
+            _percent(law.deviation) if law.determined else "not determined",
+            _percent(law.law_deviation) if law.determined else "–",
         )
     return table
 

@@ -192,7 +192,7 @@ def headers() -> Path:
 
 @cache
 def _folder() -> Path:
-    folder = Path(tempfile.mkdtemp(prefix="thsa-cosim-test-fmus-"))
+    folder = Path(tempfile.mkdtemp(prefix="test-fmus-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
 

@@ -29,6 +29,7 @@ typedef struct {
 } Model;
 
 static volatile double sink;
+static char* volatile kept;
 
 static void start(Model* m) {
     const fmi2CallbackFunctions* callbacks = m->callbacks;
@@ -72,6 +73,7 @@ static fmi2Status misbehave(Model* m, double t, double h) {
                 size_t n = 1 << 20;
                 char* block = malloc(n);
                 memset(block, 1, n);
+                kept = block;
             }
         case FLOOD:
             for (int i = 0; i < 20000 && !m->flooded; i++) {
@@ -94,6 +96,7 @@ static fmi2Status misbehave(Model* m, double t, double h) {
         case LEAK: {
             char* block = malloc(4 << 20);
             memset(block, 1, 4 << 20);
+            kept = block;
             break;
         }
         case SHUTDOWN: kill(getpid(), SIGTERM); break;

@@ -54,7 +54,7 @@ class Study:
             if b"__main__" in data and self.main is None:
                 data_of_main = spawn.get_preparation_data("thsa-cosim worker")
                 # Only what it takes to import the main module (the rest may not, or need not, travel).
-                wanted = ("init_main_from_name", "init_main_from_path")
+                wanted = ("sys_argv", "init_main_from_name", "init_main_from_path")
                 self.main = {key: data_of_main[key] for key in wanted if key in data_of_main}
             (self.folder / "experiments" / f"{self.index[name]}.pickle").write_bytes(data)
 

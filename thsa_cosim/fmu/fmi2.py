@@ -1,7 +1,11 @@
 """FMI 2.0 through ctypes (clause 2.1 and 4.2 of the FMI 2.0.4 standard)."""
 
+import contextlib
 import ctypes
+import importlib.util
+import sys
 from functools import cache
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -161,10 +165,14 @@ def _shared_callbacks() -> _Callbacks:
     # The C library's own functions: no Python runs in an FMU's allocations.
     allocate, free = (ctypes.cast(f, ctypes.c_void_p).value for f in (libc.calloc, libc.free))
     callbacks = _Callbacks(_Logger(_log), allocate, free, None, None)
-    try:
-        # Python cannot read printf arguments; fmpy's C helper formats before our logger is called.
-        from fmpy.logging import addLoggerProxy
-    except Exception:  # no helper for this platform: messages keep their %s
-        return callbacks
-    addLoggerProxy(ctypes.addressof(callbacks))
+    # Python cannot read printf arguments; fmpy's C helper formats before our logger is called. It is loaded
+    # without importing fmpy, which would cost every worker a tenth of a second.
+    package = importlib.util.find_spec("fmpy")
+    folder = {"linux": "linux64", "darwin": "darwin64", "win32": "win64"}.get(sys.platform, "")
+    suffix = {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
+    if package is not None and package.origin is not None:
+        with contextlib.suppress(OSError, AttributeError):  # no helper here: messages keep their %s
+            helper = ctypes.CDLL(str(Path(package.origin).parent / "logging" / folder / f"logging{suffix}"))
+            helper.addLoggerProxy.argtypes, helper.addLoggerProxy.restype = [ctypes.c_void_p], None
+            helper.addLoggerProxy(ctypes.addressof(callbacks))
     return callbacks

@@ -5,10 +5,13 @@ from __future__ import annotations
 import ctypes as ct
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from runtime.harness import DISCARD, ERROR, OK, Array, Fmi2, Fmi3, Refused, doubles, ints, refs, run, sizes
+from runtime.fmi2 import Fmi2
+from runtime.fmi3 import Fmi3, run
+from runtime.harness import DISCARD, ERROR, OK, Array, Refused, doubles, ints, refs, sizes
 from test_runtime_solver import KNOTS, linear_exact, piecewise
 
 R = sizes("runaway")  # negative parameter: cannot be initialised; fails beyond time 1
@@ -169,7 +172,8 @@ def test_null_instances_and_null_pointers_are_refused(function: str) -> None:
         given = arguments(fmu)
         assert getattr(fmu.lib, f"fmi3{function}")(None, *given) == ERROR
         for index, argument in enumerate(given):
-            if isinstance(argument, ct.Array) and len(argument) or type(argument).__name__ == "CArgObject":
+            filled = isinstance(argument, ct.Array) and len(argument) > 0
+            if filled or type(argument).__name__ == "CArgObject":
                 bad = [None if i == index else a for i, a in enumerate(given)]
                 status = fmu.raw(function, *bad)
                 assert status == (OK if function == "FreeFMUState" else ERROR), (function, index)
@@ -217,7 +221,7 @@ def drive(fmu: Fmi3 | Fmi2, begin: int = 0, end: int = 50) -> Array:
     r = fmu.refs
     times = np.arange(begin, end + 1) * 0.01
     rows = []
-    for time, after in zip(times[:-1], times[1:], strict=True):
+    for time, after in pairwise(times):
         fmu.set([r.u, r.u + 1], [2.0 * np.cos(20.0 * time), 0.3])
         fmu.step(time, after - time)
         rows.append(fmu.get([0, r.x, r.x + 1, r.x + 2, r.w + 2]))
@@ -328,7 +332,9 @@ def test_adjoint_is_the_transpose_of_the_directional_derivative(model: str) -> N
         unknown = [*range(r.dx, r.dx + r.n.x), *range(r.w, r.w + r.n.w)]
         jacobian = np.array([fmu.derivative(unknown, [vr], [1.0]) for vr in known]).T
         seed = np.linspace(-1.0, 2.0, len(unknown))
-        np.testing.assert_allclose(fmu.derivative(unknown, known, seed, adjoint=True), seed @ jacobian, rtol=1e-13)
+        np.testing.assert_allclose(
+            fmu.derivative(unknown, known, seed, adjoint=True), seed @ jacobian, rtol=1e-13
+        )
 
 
 def test_output_derivatives_and_indicators() -> None:

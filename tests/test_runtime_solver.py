@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from runtime.harness import DISCARD, Array, Fmi2, Refused, run, sizes
+from runtime.fmi2 import Fmi2
+from runtime.fmi3 import run
+from runtime.harness import DISCARD, Array, Refused, sizes
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -69,7 +72,7 @@ def linear_exact(times: Array, inputs: Callable[[float], Array], knots: Array) -
     b = np.array([[1.0, 0.0], [0.0, 2.0], [0.0, 0.0]])
     x, rows = np.array([1.0, 0.0, 0.0]), []
     grid = np.unique(np.concatenate([times, knots[knots < times[-1]]]))
-    for begin, end in zip(grid[:-1], grid[1:], strict=True):
+    for begin, end in pairwise(grid):
         if begin in times:
             rows.append(x)
         u, then = inputs(begin), inputs(end)
@@ -144,7 +147,9 @@ def test_random_linear_runs_do_not_depend_on_the_communication_step() -> None:
 M, K, F_C, F_S, V_S, V_R, B = 1.0, 100.0, 1.0, 1.5, 0.01, 1e-7, 0.5
 
 
-def block(times: Array, pull: Callable[[float], float], load: Callable[[float], float] = lambda _t: 0.0) -> Array:
+def block(
+    times: Array, pull: Callable[[float], float], load: Callable[[float], float] = lambda _t: 0.0
+) -> Array:
     def friction(v: float) -> float:
         return (F_C + (F_S - F_C) * np.exp(-((v / V_S) ** 2))) * float(np.clip(v / V_R, -1.0, 1.0)) + B * v
 
@@ -228,7 +233,10 @@ def test_saturated_integrator_holds_and_releases(pieces: int) -> None:
     solved = solve_ivp(rhs, (0.0, 2.0), [0.0, 0.0], "Radau", times, rtol=1e-9, atol=1e-11, max_step=1e-3)
     with Fmi2("saturation", logging=True) as fmu:
         found = run(
-            fmu.start(), times, [fmu.refs.x, fmu.refs.x + 1], lambda t: [float(np.interp(t, knots, course)), 0.0]
+            fmu.start(),
+            times,
+            [fmu.refs.x, fmu.refs.x + 1],
+            lambda t: [float(np.interp(t, knots, course)), 0.0],
         )
         assert 4 <= fmu.events() <= 20
     assert np.abs(found - solved.y.T).max() < 1e-5 * np.ptp(solved.y)

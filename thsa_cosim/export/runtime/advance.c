@@ -157,6 +157,7 @@ static void commit(Instance *c, double time, const double *g_end, double from, c
 
 Status solver_advance(Instance *c, double end) {
     Motion *now = &c->s.now;
+    const double whole = end - now->time;
     double from = now->time, u_from[N_U + 1], g[N_G + 1], last_event = -DBL_MAX, blind = 0.0;
     long attempts = 0;
     int rapid = 0;
@@ -173,7 +174,7 @@ Status solver_advance(Instance *c, double end) {
         if (!(now->step > 0.0)) now->step = first_step(c, remaining);
         h = 1.1 * now->step >= remaining ? remaining : now->step > 0.5 * remaining ? 0.5 * remaining : now->step;
         if (rapid > MOST_RAPID) {
-            blind = fmin(blind > 0.0 ? 8.0 * blind : 64.0 * grain, 1e-3 * now->step);
+            blind = fmin(blind > 0.0 ? 8.0 * blind : 64.0 * grain, 1e-3 * whole);
             h = fmin(h, fmax(blind, grain));
         }
         for (;;) { /* attempts at one step */
@@ -201,6 +202,9 @@ Status solver_advance(Instance *c, double end) {
             }
             c->rejected++;
             was_rejected = 1;
+            if (c->categories & LOG_SOLVER)
+                instance_log(c, OK, LOG_SOLVER, "a step of %.3g at time %.15g is rejected: scaled error %.3g", h,
+                             now->time, error);
             landing = 0;
             h *= error < 0.0 ? 0.1 : fmax(0.1, 0.9 * pow(error, -0.2));
             now->step = h;
@@ -239,7 +243,9 @@ Status solver_advance(Instance *c, double end) {
     for (int k = 0; k < N_U; k++) s->now.u[k] += (end - s->now.time) * s->du[k];
     s->now.time = end;
     instance_changed(c);
-    return instance_update_modes(c);
+    const Status status = instance_update_modes(c);
+    if (status == OK && c->after_step) c->after_step(c);
+    return status;
 }
 
 #endif

@@ -160,6 +160,12 @@ Status instance_update_modes(Instance *c) {
     return fail(c, DISCARD, "the event iteration does not settle");
 }
 
+static Status not_initialized(Instance *c, const char *why) {
+    memcpy(c->s.now.x, c->s.x_start, sizeof c->s.now.x);
+    instance_changed(c);
+    return fail(c, FAILED, why);
+}
+
 Status instance_initialize(Instance *c) {
     State *s = &c->s;
     Status status = update_dependent(c);
@@ -171,14 +177,14 @@ Status instance_initialize(Instance *c) {
         instance_changed(c);
         if (model_initial(s->now.time, s->now.u, s->p, s->d, s->now.m, s->x_start, s->now.x) ||
             !all_finite(s->now.x, N_X))
-            return fail(c, FAILED, "the initial equations have no solution");
-        if (instance_indicators(c) != OK) return FAILED;
+            return not_initialized(c, "the initial equations have no solution");
+        if (instance_indicators(c) != OK) return not_initialized(c, "a relation cannot be evaluated");
         if (!switch_modes(c, 0)) {
             s->initial_due = 0;
             return OK;
         }
     }
-    return fail(c, FAILED, "the initial equations and relations do not settle");
+    return not_initialized(c, "the initial equations and relations do not settle");
 }
 
 Status instance_settle(Instance *c) {
@@ -259,11 +265,6 @@ Status instance_get(Instance *c, const unsigned *vr, size_t n, double *values) {
         if ((k = within(v, VR_W, N_W)) >= 0) {
             if (unsolved) return fail(c, FAILED, "an output or local variable is read before initialization");
             if ((status = k < N_Y ? evaluate_outputs(c) : evaluate_algebraic(c)) != OK) return status;
-            if (!is_finite(c->w[k])) {
-                instance_log(c, DISCARD, LOG_DISCARD, "value reference %u is not finite at time %.15g", v,
-                             s->now.time);
-                return DISCARD;
-            }
             values[i] = c->w[k];
         } else if ((k = within(v, VR_X, N_X)) >= 0) {
             values[i] = unsolved ? s->x_start[k] : s->now.x[k];
@@ -290,6 +291,10 @@ Status instance_get(Instance *c, const unsigned *vr, size_t n, double *values) {
             instance_log(c, FAILED, LOG_ERROR, "value reference %u is not a Real variable of this model", v);
             return FAILED;
         }
+        if (is_finite(values[i])) continue;
+        instance_log(c, DISCARD, LOG_DISCARD, "value reference %u is not finite at time %.15g", v, s->now.time);
+        values[i] = 0.0;
+        return DISCARD;
     }
     return OK;
 }

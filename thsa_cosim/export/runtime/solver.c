@@ -11,6 +11,10 @@
 #include <string.h>
 #include "solver.h"
 
+#if defined(_MSC_VER) && !defined(__clang__)
+#define restrict __restrict
+#endif
+
 #if N_X > 0
 
 enum { STAGES = RODAS_STAGES, FULL_ROWS = 6 }; /* rows of a that are not "previous row plus last stage" */

@@ -3,6 +3,7 @@
 ``schema`` holds the file's tables (one pydantic class each, one class per kind), ``model`` the frozen objects
 that the use cases get, ``load`` turns the one into the other, ``check`` holds a scenario against its FMU and
 ``sentences`` turns a wrong key or value into one sentence; ``stages`` runs several scenarios in order.
+The ``tune_`` modules are the same for tunings, which need no recordings.
 """
 
 from thsa_cosim.scenario.load import load_scenario
@@ -17,6 +18,8 @@ from thsa_cosim.scenario.model import (
 )
 from thsa_cosim.scenario.schema import KINDS
 from thsa_cosim.scenario.stages import Stage, StagedScenario, hand_on, load_study
+from thsa_cosim.scenario.tune_load import load_tune
+from thsa_cosim.scenario.tune_model import TuneScenario
 
 __all__ = [
     "KINDS",
@@ -29,7 +32,9 @@ __all__ = [
     "Stage",
     "StagedScenario",
     "TemperaturePoint",
+    "TuneScenario",
     "hand_on",
     "load_scenario",
     "load_study",
+    "load_tune",
 ]

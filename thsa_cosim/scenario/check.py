@@ -9,13 +9,16 @@ from thsa_cosim.errors import ParameterError, ScenarioError, UnitError, did_you_
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.scenario.schema import CommonTable, IdentifyTable, ParameterTable, SimulateTable
+from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.ssv import read_ssv
 from thsa_cosim.units import convert
 
 _SETTABLE = ("parameter", "structuralParameter")
 
 
-def _variable(fmu: FmuDescription, name: str, key: str, candidates: tuple[Variable, ...] = ()) -> Variable:
+def find_variable(
+    fmu: FmuDescription, name: str, key: str, candidates: tuple[Variable, ...] = ()
+) -> Variable:
     """Return the FMU's variable; ScenarioError with the closest of ``candidates`` (default: all)."""
     if name in fmu.variables:
         if fmu.variables[name].is_array:
@@ -42,7 +45,7 @@ def roles(table: CommonTable, fmu: FmuDescription) -> tuple[tuple[str, ...], tup
     inputs, measured = [], []
     for name, column in columns.items():
         key = f"recordings.columns.{name}"
-        variable = _variable(fmu, name, key, fmu.inputs + fmu.outputs)
+        variable = find_variable(fmu, name, key, fmu.inputs + fmu.outputs)
         if variable.causality == "input":
             inputs.append(name)
         elif variable.causality in ("output", "local") and variable.type != "String":
@@ -59,7 +62,7 @@ def roles(table: CommonTable, fmu: FmuDescription) -> tuple[tuple[str, ...], tup
             )
     source = table.temperature.input if table.temperature else None
     if source is not None and source not in columns:
-        _variable(fmu, source, "temperature.input", fmu.inputs)
+        find_variable(fmu, source, "temperature.input", fmu.inputs)
         raise ScenarioError(f"temperature.input {source!r} has no column; add [recordings.columns.{source}].")
     return tuple(inputs), tuple(measured)
 
@@ -69,7 +72,7 @@ def outputs(table: CommonTable, fmu: FmuDescription, measured: tuple[str, ...]) 
     if not isinstance(table, SimulateTable):
         return measured
     for name in table.outputs:
-        variable = _variable(fmu, name, "outputs", fmu.outputs)
+        variable = find_variable(fmu, name, "outputs", fmu.outputs)
         if variable.type == "String":
             raise ScenarioError(f"outputs: {name!r} of {fmu.path.name} is a text; only numbers are recorded.")
     own = tuple(v.name for v in fmu.outputs if v.type != "String" and not v.is_array)
@@ -87,7 +90,7 @@ def parameters(table: IdentifyTable, fmu: FmuDescription) -> tuple[tuple[Paramet
     found = []
     for p in table.parameters:
         key = f"parameters[{p.name}].variable"
-        variable = _settable(fmu, p.variable, key)
+        variable = settable(fmu, p.variable, key)
         if not variable.is_float:
             raise ScenarioError(
                 f"{key}: {p.variable!r} is a {variable.type}; only real numbers are searched."
@@ -105,13 +108,22 @@ def parameters(table: IdentifyTable, fmu: FmuDescription) -> tuple[tuple[Paramet
         )
         low, high = sorted((plain.to_variable(p.lower), plain.to_variable(p.upper)))
         for key_name, value in (("lower", low), ("upper", high)):
-            _check_range(variable, value, f"parameters[{p.name}].{key_name}", fmu)
+            check_range(variable, value, f"parameters[{p.name}].{key_name}", fmu)
         found.append((replace(plain, description=p.description or variable.description), p.per))
     return tuple(found)
 
 
-def _settable(fmu: FmuDescription, name: str, key: str) -> Variable:
-    variable = _variable(fmu, name, key, fmu.parameters)
+def readable(fmu: FmuDescription, name: str, key: str) -> Variable:
+    """Return a variable whose number can be recorded; ScenarioError otherwise."""
+    variable = find_variable(fmu, name, key, fmu.outputs)
+    if variable.type == "String":
+        raise ScenarioError(f"{key}: {name!r} of {fmu.path.name} is a text; only numbers are recorded.")
+    return variable
+
+
+def settable(fmu: FmuDescription, name: str, key: str) -> Variable:
+    """Return a variable that can be given a start value; ScenarioError otherwise."""
+    variable = find_variable(fmu, name, key, fmu.parameters)
     start_value = variable.initial in ("exact", "approx") and variable.causality in ("local", "output")
     if variable.causality in _SETTABLE or (start_value and variable.variability != "constant"):
         return variable
@@ -123,7 +135,8 @@ def _settable(fmu: FmuDescription, name: str, key: str) -> Variable:
     )
 
 
-def _check_range(variable: Variable, value: float, key: str, fmu: FmuDescription) -> None:
+def check_range(variable: Variable, value: float, key: str, fmu: FmuDescription) -> None:
+    """ParameterError if the FMU does not allow ``value`` (in its unit) for a variable."""
     below = variable.minimum is not None and value < variable.minimum - 1e-12 * abs(variable.minimum)
     above = variable.maximum is not None and value > variable.maximum + 1e-12 * abs(variable.maximum)
     if below or above:
@@ -134,7 +147,9 @@ def _check_range(variable: Variable, value: float, key: str, fmu: FmuDescription
         )
 
 
-def fixed(path: Path, table: CommonTable, fmu: FmuDescription, space: ParameterSpace) -> dict[str, float]:
+def fixed(
+    path: Path, table: CommonTable | TuneTable, fmu: FmuDescription, space: ParameterSpace
+) -> dict[str, float]:
     """Return FMU start values: the parameter set's, overridden by zeroed coefficients, then by ``[fixed]``.
 
     Raises
@@ -147,8 +162,8 @@ def fixed(path: Path, table: CommonTable, fmu: FmuDescription, space: ParameterS
     own: dict[str, float] = {}
     for name, value in table.fixed.items():
         key = f"fixed.{_quoted(name)}"
-        variable = _settable(fmu, name, key)
-        _check_range(variable, float(value), key, fmu)
+        variable = settable(fmu, name, key)
+        check_range(variable, float(value), key, fmu)
         if name in searched:
             raise ScenarioError(f"{key} is searched for as parameter {searched[name]!r}; remove one of them.")
         own[name] = float(value)
@@ -164,7 +179,7 @@ def fixed(path: Path, table: CommonTable, fmu: FmuDescription, space: ParameterS
     return {name: value for name, value in merged.items() if name not in searched}
 
 
-def zeroed(table: CommonTable, fmu: FmuDescription) -> dict[str, tuple[str, ...]]:
+def zeroed(table: CommonTable | TuneTable, fmu: FmuDescription) -> dict[str, tuple[str, ...]]:
     """Return, by parameter name, the FMU parameters that its ``zero`` and ``law_block`` set to 0."""
     if not isinstance(table, IdentifyTable):
         return {}
@@ -176,22 +191,22 @@ def zeroed(table: CommonTable, fmu: FmuDescription) -> dict[str, tuple[str, ...]
 
 def _zeroed(fmu: FmuDescription, parameter: ParameterTable) -> list[str]:
     """Return the FMU parameters that ``zero`` (names and globs) and ``law_block`` set to 0."""
-    settable = [v.name for v in fmu.parameters if v.is_float]
+    known = [v.name for v in fmu.parameters if v.is_float]
     names: list[str] = []
     for pattern in parameter.zero:
         if pattern in fmu.variables:
-            names.append(_settable(fmu, pattern, f"parameters[{parameter.name}].zero").name)
-        elif matches := fnmatch.filter(settable, pattern):
+            names.append(settable(fmu, pattern, f"parameters[{parameter.name}].zero").name)
+        elif matches := fnmatch.filter(known, pattern):
             names += matches
         else:
             raise ScenarioError(
                 f"parameters[{parameter.name}].zero: {pattern!r} matches no parameter of {fmu.path.name}."
-                f"{did_you_mean(pattern, settable)}"
+                f"{did_you_mean(pattern, known)}"
             )
     if parameter.law_block is not None:
-        inside = [n for n in settable if n.rpartition(".")[0] == parameter.law_block]
+        inside = [n for n in known if n.rpartition(".")[0] == parameter.law_block]
         if not inside:
-            blocks = {n.rpartition(".")[0] for n in settable} - {""}
+            blocks = {n.rpartition(".")[0] for n in known} - {""}
             raise ScenarioError(
                 f"parameters[{parameter.name}].law_block: {fmu.path.name} has no block"
                 f" {parameter.law_block!r} with parameters.{did_you_mean(parameter.law_block, blocks)}"
@@ -200,7 +215,7 @@ def _zeroed(fmu: FmuDescription, parameter: ParameterTable) -> list[str]:
     return [n for n in names if n != parameter.variable]
 
 
-def _parameter_set(path: Path, table: CommonTable, fmu: FmuDescription) -> dict[str, float]:
+def _parameter_set(path: Path, table: CommonTable | TuneTable, fmu: FmuDescription) -> dict[str, float]:
     if table.parameter_set is None:
         return {}
     file = path.parent / table.parameter_set
@@ -208,13 +223,13 @@ def _parameter_set(path: Path, table: CommonTable, fmu: FmuDescription) -> dict[
     values: Mapping[str, float] = given.values
     result = {}
     for name, value in values.items():
-        variable = _settable(fmu, name, f"parameter_set ({file.name})")
+        variable = settable(fmu, name, f"parameter_set ({file.name})")
         try:
             unit = given.units.get(name)
             result[name] = convert(value, unit, variable.unit) if unit and variable.unit else value
         except UnitError as error:
             raise UnitError(f"{file}: {name!r}: {error}") from None
-        _check_range(variable, result[name], f"parameter_set ({file.name})", fmu)
+        check_range(variable, result[name], f"parameter_set ({file.name})", fmu)
     return result
 
 

@@ -1,0 +1,229 @@
+"""Linearisation of an FMU around a state, and its loop opened at one of its signals.
+
+Model Exchange gives dx/dt = f(x, u, p) and any signal s(x, u, p) at a state of our choice. A loop is opened
+at s without touching the model: s acts on dx/dt through some b = ∂f/∂s that is seen whenever a parameter that
+acts through s alone (a gain of the controller) is changed while state and inputs stay, b = Δf / Δs. Then
+dx/dt = (A - b c) x + b s with A = ∂f/∂x, c = ∂s/∂x is the open system from s to s, and -c (jωI - A + b c)⁻¹ b
+the loop's transfer function. No matter whether the controller feeds forward or observes: what returns to s
+counts.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from thsa_cosim.errors import FmuError
+from thsa_cosim.fmu.description import FmuDescription
+from thsa_cosim.fmu.failure import SimulationFailure, Status
+from thsa_cosim.fmu.fmi2 import Fmi2Instance
+from thsa_cosim.fmu.fmi3 import Fmi3Instance
+from thsa_cosim.fmu.instance import Channel, Instance
+from thsa_cosim.signals import FloatArray
+
+_STEP = 1e-6
+"""Difference step relative to a state's size (at least its nominal value)."""
+_GAIN_STEP = 0.1
+"""Relative change of a gain that shows how the signal acts."""
+_EVENTS_AT_ONE_TIME = 200
+
+
+@dataclass(frozen=True, eq=False)
+class OpenLoop:
+    """dx/dt = a x + b s, s returned = c x: ``a`` (n, n), ``b`` (n,), ``c`` (n,) around one state.
+
+    ``derivatives``: "directional" where the FMU gave ∂f/∂x itself, else "differences".
+    """
+
+    states: tuple[str, ...]
+    a: FloatArray
+    b: FloatArray
+    c: FloatArray
+    derivatives: str
+
+    def response(self, omega: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
+        """Loop transfer function L(jω) (m,) at ``omega`` (m,) in rad/s; 1 + L is the return difference."""
+        matrices = 1j * omega[:, None, None] * np.eye(len(self.b)) - self.a
+        states = np.linalg.solve(matrices, np.broadcast_to(self.b[:, None], (len(omega), len(self.b), 1)))
+        return np.asarray(-np.squeeze(self.c @ states, axis=-1), dtype=np.complex128)
+
+
+def state_names(description: FmuDescription) -> tuple[str, ...]:
+    """Names of the continuous states, in the order of the state vector; FmuError if they are not stated."""
+    by_reference = {v.value_reference: v.name for v in description.variables.values() if v.is_float}
+    names = tuple(by_reference.get(state, "") for state, _ in description.state_references)
+    if not names or not all(names) or len(names) != description.states:
+        raise FmuError(
+            f"{description.path} does not say which variables its states are; it cannot be linearised."
+        )
+    return names
+
+
+def open_loop(
+    description: FmuDescription,
+    folder: Path,
+    *,
+    values: Mapping[str, float],
+    inputs: Mapping[str, float],
+    time: float,
+    states: FloatArray,
+    signal: str,
+    gains: Sequence[str],
+) -> OpenLoop:
+    """Linearise at ``states`` (n,) and open the loop at ``signal``.
+
+    Parameters
+    ----------
+    folder
+        Where the FMU is unpacked.
+    values, inputs
+        Start values and constant inputs by name, in the FMU's units.
+    time
+        Simulated time of that state, s.
+    gains
+        Parameters that act through ``signal`` alone; the one that moves it most is used.
+
+    Raises
+    ------
+    SimulationFailure
+        If the FMU refuses, or no gain moves the signal.
+    FmuError
+        If the FMU does not name its states.
+    """
+    names = state_names(description)
+    with _Point(description, folder, values, inputs, time, states, signal) as point:
+        size = np.maximum(np.abs(states), point.nominal())
+        steps = _STEP * size
+        probes = [states] + [
+            states + step * row for step, row in zip(steps, np.eye(len(states)), strict=True)
+        ]
+        here = [point.evaluate(x) for x in probes]
+        below = [
+            point.evaluate(states - step * row) for step, row in zip(steps, np.eye(len(states)), strict=True)
+        ]
+        jacobian = np.stack(
+            [(up - down) / (2.0 * h) for up, down, h in zip(here[1:], below, steps, strict=True)], axis=1
+        )
+        kind = point.directional(states, jacobian)
+    # At the working point a controller that feeds forward perfectly has no error: then move the states as well.
+    moved = [states + 1e-3 * s * row for s, row in zip(size, np.eye(len(states)), strict=True)]
+    for group in ([states], moved):
+        with _Point(description, folder, values, inputs, time, states, signal) as point:
+            base = [point.evaluate(x) for x in group]
+        best = np.zeros(len(states) + 1)
+        for name in gains:
+            value = values[name]
+            changed = {**values, name: value * (1.0 + _GAIN_STEP) if value else _GAIN_STEP}
+            with _Point(description, folder, changed, inputs, time, states, signal) as point:
+                found = [point.evaluate(x) - before for x, before in zip(group, base, strict=True)]
+            best = max([best, *(f for f in found if np.isfinite(f).all())], key=lambda f: abs(float(f[-1])))
+        if abs(best[-1]) > 1e-6 * max(1.0, abs(float(base[0][-1]))):
+            break
+    else:
+        raise SimulationFailure(
+            Status.FMI_ERROR, f"no gain moves {signal!r}; the loop cannot be opened there"
+        )
+    b = best[:-1] / best[-1]
+    c = jacobian[-1]
+    return OpenLoop(names, jacobian[:-1] - np.outer(b, c), b, c, kind)
+
+
+class _Point:
+    """One Model Exchange instance held at a time; gives (dx/dt, s) for states of our choice."""
+
+    def __init__(
+        self,
+        description: FmuDescription,
+        folder: Path,
+        values: Mapping[str, float],
+        inputs: Mapping[str, float],
+        time: float,
+        states: FloatArray,
+        signal: str,
+    ) -> None:
+        cls = Fmi2Instance if description.fmi_version == "2.0" else Fmi3Instance
+        self._instance: Instance = cls(folder, description, "model-exchange")
+        self._derivatives = (
+            "GetDerivatives" if description.fmi_version == "2.0" else "GetContinuousStateDerivatives"
+        )
+        self._description = description
+        self._signal: list[Channel] = []
+        try:
+            self._begin(values, inputs, time, states, signal)
+        except BaseException:
+            self._instance.free()
+            raise
+
+    def _begin(
+        self,
+        values: Mapping[str, float],
+        inputs: Mapping[str, float],
+        time: float,
+        states: FloatArray,
+        signal: str,
+    ) -> None:
+        instance, description = self._instance, self._description
+        instance.instantiate()
+        _set(instance, values)
+        instance.initialize_begin(0.0, max(time, 1.0), None)
+        _set(instance, inputs)
+        instance.initialize_end()
+        self._iterate()
+        self._signal = instance.channels([description.variable(signal)])
+        instance.set_time(time)
+        self.evaluate(states)
+        # Branches are frozen in Continuous-Time Mode: let the FMU choose those that belong to these states.
+        instance.enter_event_mode()
+        self._iterate()
+
+    def _iterate(self) -> None:
+        for _ in range(_EVENTS_AT_ONE_TIME):
+            if not self._instance.event_iteration().needs_update:
+                break
+        else:
+            raise SimulationFailure(Status.FMI_ERROR, "the event iteration does not come to an end")
+        self._instance.enter_continuous_time_mode()
+
+    def evaluate(self, states: FloatArray) -> FloatArray:
+        """Return dx/dt and the signal (n + 1,) at ``states`` (n,)."""
+        self._instance.vector("SetContinuousStates", np.ascontiguousarray(states))
+        out = np.empty(len(states))
+        self._instance.vector(self._derivatives, out)
+        signal = np.empty(1)
+        self._instance.get_values(self._signal, signal)
+        return np.append(out, signal)
+
+    def nominal(self) -> FloatArray:
+        """Return the states' nominal values (n,), 1 where they are of no use."""
+        nominal = np.ones(self._description.states)
+        self._instance.vector("GetNominalsOfContinuousStates", nominal)
+        usable = np.isfinite(nominal) & (nominal != 0.0)
+        return np.where(usable, np.abs(nominal), 1.0)
+
+    def directional(self, states: FloatArray, jacobian: FloatArray) -> str:
+        """Replace ∂f/∂x in ``jacobian`` (n + 1, n) by the FMU's own where it gives it; say which it is."""
+        if not self._description.capabilities.get("providesDirectionalDerivative"):
+            return "differences"
+        self._instance.vector("SetContinuousStates", np.ascontiguousarray(states))
+        references = np.array(self._description.state_references, dtype=np.uint32)
+        column = np.empty(len(states))
+        for j in range(len(states)):
+            self._instance.directional_derivative(references[:, 1], references[j : j + 1, 0], column)
+            jacobian[:-1, j] = column
+        return "directional"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._instance.free()
+
+
+def _set(instance: Instance, values: Mapping[str, float]) -> None:
+    variables = [instance.description.variable(name) for name in values]
+    instance.set_values(instance.channels(variables), np.array(list(values.values()), dtype=np.float64))

@@ -1,0 +1,339 @@
+"""From the TOML file of a tuning to a :class:`TuneScenario`, checked against its FMU."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from thsa_cosim.errors import InputError, ScenarioError, UnitError, did_you_mean
+from thsa_cosim.fmu import FmuDescription, Variable, read_description
+from thsa_cosim.parameters import Parameter, ParameterSpace
+from thsa_cosim.scenario import check
+from thsa_cosim.scenario.load import read_toml
+from thsa_cosim.scenario.model import SearchSpec, SimulationSpec
+from thsa_cosim.scenario.schema import KINDS
+from thsa_cosim.scenario.sentences import from_validation, one_line
+from thsa_cosim.scenario.tune_model import (
+    LOOP_METRICS,
+    METRICS,
+    TERMS,
+    Axis,
+    CommandSpec,
+    ControlCostSpec,
+    LineSpec,
+    LoopSpec,
+    MetricsSpec,
+    ParetoSpec,
+    Requirement,
+    ScheduleSpec,
+    SurfaceSpec,
+    TuneScenario,
+)
+from thsa_cosim.scenario.tune_schema import ConditionTable, RequirementTable, TuneTable
+from thsa_cosim.scenario.tune_uncertainty import read_uncertainty
+from thsa_cosim.signals import FloatArray
+from thsa_cosim.units import convert
+
+
+def load_tune(path: Path | str, *, seed: int | None = None, fmu: Path | str | None = None) -> TuneScenario:
+    """Read, check and resolve a scenario of kind "tune".
+
+    ``seed`` and ``fmu`` replace the scenario's own.
+
+    Raises
+    ------
+    ScenarioError
+        For a key, value or reference that is wrong.
+    FmuError, ParameterError, UnitError
+        As the FMU and the values deserve. Every message is one line.
+    """
+    path = Path(path)
+    data = read_toml(path)
+    kind = data.get("kind")
+    if kind != "tune":
+        if isinstance(kind, str) and kind in KINDS:
+            raise ScenarioError(
+                one_line(f"{path} is a scenario of kind {kind!r}: run 'thsa-cosim {kind} {path}'.")
+            )
+        hint = did_you_mean(kind, ["tune"]) if isinstance(kind, str) else ""
+        what = "is missing" if kind is None else f"is {kind!r}"
+        raise ScenarioError(one_line(f'{path}: kind {what}; thsa-cosim tune takes kind = "tune".{hint}'))
+    try:
+        table = TuneTable.model_validate(data)
+    except ValidationError as error:
+        raise from_validation(path, data, error) from None
+    try:
+        return _resolve(path, table, seed, read_description(fmu or path.parent / table.fmu))
+    except InputError as error:
+        message = str(error) if str(path) in str(error) else f"{path}: {error}"
+        raise type(error)(one_line(message)) from None
+
+
+def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription) -> TuneScenario:
+    command = _command(table, fmu)
+    axes = tuple(_axis(name, axis, fmu, f"conditions.{name}") for name, axis in table.conditions.items())
+    driven = {command.input, *(axis.name for axis in axes)}
+    for variable in fmu.inputs:
+        if variable.is_float and variable.name not in driven:
+            raise ScenarioError(
+                f"conditions.{variable.name} is missing: input {variable.name!r} of {fmu.path.name} needs values."
+            )
+    if command.input in table.conditions:
+        raise ScenarioError(f"conditions.{command.input} is the command's input; remove it.")
+    space = ParameterSpace(tuple(_gain(table, k, fmu) for k in range(len(table.parameters))))
+    fixed = check.fixed(path, table, fmu, space)
+    for key, values in {
+        "before": table.before,
+        **{f"compare.{n}": v for n, v in table.compare.items()},
+    }.items():
+        _all_gains(key, values, space)
+    if table.metrics.effort is not None:
+        check.readable(fmu, table.metrics.effort, "metrics.effort")
+    window = (float(table.metrics.window[0]), float(table.metrics.window[1]))
+    if window[0] > command.time[-1]:
+        raise ScenarioError("metrics.window begins after command.stop; move one of them.")
+    if table.robust.combine == "worst" and any(axis.weights for axis in table.conditions.values()):
+        raise ScenarioError("conditions: weights go with robust.combine = 'sum'; remove them or set it.")
+    requirements = tuple(_requirement(k, r, table, command, fmu) for k, r in enumerate(table.requirements))
+    return TuneScenario(
+        path=path,
+        title=table.title or path.stem,
+        seed=table.seed if seed is None else seed,
+        fmu=fmu,
+        fixed=fixed,
+        command=command,
+        axes=axes,
+        parameters=space,
+        before=dict(table.before),
+        compare={name: dict(values) for name, values in table.compare.items()},
+        metrics=MetricsSpec(
+            table.metrics.rise,
+            table.metrics.fraction,
+            table.metrics.low,
+            table.metrics.high,
+            window,
+            table.metrics.settling_band,
+            table.metrics.effort,
+        ),
+        cost=_cost(table, command, fmu),
+        requirements=requirements,
+        loop=_loop(table, command, fmu),
+        combine=table.robust.combine,
+        uncertainty=read_uncertainty(path, table, axes, fmu),
+        schedule=_schedule(table, axes, fmu),
+        pareto=_pareto(table),
+        line=_line(table, space),
+        surface=_surface(table, space),
+        search=SearchSpec(**table.search.model_dump(), polish=False),
+        simulation=_simulation(table),
+    )
+
+
+def _command(table: TuneTable, fmu: FmuDescription) -> CommandSpec:
+    spec = table.command
+    source = check.find_variable(fmu, spec.input, "command.input", fmu.inputs)
+    if source.causality != "input" or not source.is_float:
+        raise ScenarioError(f"command.input: {spec.input!r} of {fmu.path.name} is no real input.")
+    follows = check.readable(fmu, spec.output, "command.output")
+    unit = spec.unit or source.unit or "1"
+    time: FloatArray = spec.step * np.arange(round(spec.stop / spec.step) + 1, dtype=np.float64)
+    begin = spec.begin
+    values: FloatArray
+    if spec.points is not None:
+        corners = np.array(spec.points, dtype=np.float64)
+        values = np.interp(time, corners[:, 0], corners[:, 1])
+        moving = np.flatnonzero(np.diff(corners[:, 1]))
+        begin = float(corners[moving[0], 0]) if moving.size else 0.0
+        if float(corners[-1, 0]) > time[-1] + 1e-9:
+            raise ScenarioError("command.points run beyond command.stop; raise it or cut them.")
+    elif spec.shape == "ramp" and spec.final is not None and spec.rate is not None:
+        rise = np.minimum(spec.rate * np.maximum(time - begin, 0.0), abs(spec.final))
+        values = np.asarray(np.sign(spec.final) * rise, dtype=np.float64)
+    else:
+        values = np.where(time >= begin - 1e-12, float(spec.final or 0.0), 0.0)
+    try:
+        values = convert(values, unit, source.unit or unit)
+        factor = convert(1.0, follows.unit, source.unit) if follows.unit and source.unit else 1.0
+    except UnitError as error:
+        raise UnitError(f"command: {error}") from None
+    return CommandSpec(spec.input, spec.output, unit, time, values, begin, factor)
+
+
+def _axis(name: str, table: ConditionTable, fmu: FmuDescription, key: str) -> Axis:
+    variable = check.find_variable(fmu, name, key, fmu.inputs)
+    if variable.causality != "input":
+        raise ScenarioError(
+            f"{key}: {name!r} is a {variable.causality} of {fmu.path.name}; set it in [fixed]."
+        )
+    if table.values is not None:
+        values = [float(v) for v in table.values]
+    else:
+        assert table.from_ is not None
+        assert table.to is not None
+        assert table.step is not None
+        count = int(np.floor((table.to - table.from_) / table.step * (1 + 1e-9))) + 1
+        values = [table.from_ + k * table.step for k in range(count)]
+    unit = table.unit or variable.unit or "1"
+    axis = Axis(name, unit, variable.unit or unit, tuple(values), tuple(table.weights or [1.0] * len(values)))
+    try:
+        for value in values:
+            check.check_range(variable, axis.to_fmu(value), key, fmu)
+    except UnitError as error:
+        raise UnitError(f"{key}: {error}") from None
+    return axis
+
+
+def _gain(table: TuneTable, k: int, fmu: FmuDescription) -> Parameter:
+    p = table.parameters[k]
+    key = f"parameters[{p.name}].variable"
+    variable = check.settable(fmu, p.variable, key)
+    if not variable.is_float:
+        raise ScenarioError(f"{key}: {p.variable!r} is a {variable.type}; only real numbers are searched.")
+    parameter = Parameter(
+        p.name, p.variable, p.unit, p.lower, p.upper, p.scale, p.start,
+        p.description or variable.description, variable.unit or None,
+    )  # fmt: skip
+    for side in ("lower", "upper"):
+        value = parameter.to_variable(getattr(p, side))
+        check.check_range(variable, value, f"parameters[{p.name}].{side}", fmu)
+    return parameter
+
+
+def _all_gains(key: str, values: Mapping[str, float], space: ParameterSpace) -> None:
+    for name in values:
+        if name not in space.names:
+            raise ScenarioError(
+                f"{key}.{name} is no parameter of [[parameters]].{did_you_mean(name, space.names)}"
+            )
+    for name in space.names:
+        if name not in values:
+            raise ScenarioError(f"{key}.{name} is missing; give every parameter a value.")
+
+
+def _requirement(
+    k: int, spec: RequirementTable, table: TuneTable, command: CommandSpec, fmu: FmuDescription
+) -> Requirement:
+    key = f"requirements[{k + 1}]"
+    limit = spec.maximum if spec.maximum is not None else spec.minimum
+    assert limit is not None
+    unit, scale = METRICS[spec.metric]
+    if spec.metric in LOOP_METRICS and table.loop is None:
+        raise ScenarioError(
+            f"{key}: {spec.metric} needs the table [loop] with the signal to open the loop at."
+        )
+    if spec.metric == "effort":
+        if table.metrics.effort is None:
+            raise ScenarioError(f"{key}: effort needs metrics.effort, the signal that counts.")
+        unit = fmu.variables[table.metrics.effort].unit or "1"
+    if spec.metric == "tracking_error":
+        unit = table.cost.unit or command.unit
+    if spec.metric == "peak" and spec.signal is not None:
+        variable: Variable = check.readable(fmu, spec.signal, f"{key}.signal")
+        unit = variable.unit or "1"
+        try:
+            limit = convert(limit, spec.unit, unit) if spec.unit else limit
+        except UnitError as error:
+            raise UnitError(f"{key}: {error}") from None
+        scale = abs(limit) or 1.0
+    return Requirement(
+        metric=spec.metric,
+        signal=spec.signal,
+        unit=unit,
+        limit=limit,
+        upper=spec.maximum is not None,
+        hard=spec.hard,
+        penalty=spec.penalty,
+        scale=spec.scale or scale,
+    )
+
+
+def _cost(table: TuneTable, command: CommandSpec, fmu: FmuDescription) -> ControlCostSpec:
+    unit = table.cost.unit or command.unit
+    source = fmu.variables[command.input].unit
+    try:
+        scale = convert(1.0, unit, source) if source else 1.0
+    except UnitError as error:
+        raise UnitError(f"cost.unit: {error}") from None
+    return ControlCostSpec(
+        unit, scale, table.cost.kappa_rise, table.cost.kappa_steady, table.cost.steady == "signed"
+    )
+
+
+def _loop(table: TuneTable, command: CommandSpec, fmu: FmuDescription) -> LoopSpec | None:
+    if table.loop is None:
+        return None
+    check.readable(fmu, table.loop.signal, "loop.signal")
+    at = float(command.time[-1]) if table.loop.at is None else table.loop.at
+    if at > command.time[-1]:
+        raise ScenarioError("loop.at lies after command.stop; lower it.")
+    if not fmu.supports_model_exchange:
+        raise ScenarioError(
+            f"[loop]: {fmu.path.name} has no Model Exchange, which linearising needs; export it with both or"
+            f" remove the table."
+        )
+    if table.simulation.reuse == "reset":
+        raise ScenarioError("[loop] needs simulation.reuse = 'fresh': only one instance may live at a time.")
+    return LoopSpec(table.loop.signal, at)
+
+
+def _schedule(table: TuneTable, axes: Sequence[Axis], fmu: FmuDescription) -> ScheduleSpec | None:
+    spec = table.schedule
+    if spec is None:
+        return None
+    known = [axis.name for axis in axes]
+    for name in (*spec.over, *spec.check):
+        if name not in known:
+            raise ScenarioError(f"schedule: {name!r} is none of the [conditions].{did_you_mean(name, known)}")
+    for name in spec.over:
+        axis = next(a for a in axes if a.name == name)
+        if len(axis.values) < 2 or list(axis.values) != sorted(axis.values):
+            raise ScenarioError(f"conditions.{name}: a schedule needs two or more values in rising order.")
+    if len(set(spec.over)) < len(spec.over):
+        raise ScenarioError("schedule.over names a condition twice; remove one.")
+    swept = {name: _axis(name, t, fmu, f"schedule.check.{name}") for name, t in spec.check.items()}
+    return ScheduleSpec(tuple(spec.over), spec.smoothing, tuple(swept.get(a.name, a) for a in axes))
+
+
+def _pareto(table: TuneTable) -> ParetoSpec | None:
+    if table.pareto is None:
+        return None
+    known = [*TERMS, *(f"peak.{r.signal}" for r in table.requirements if r.signal)]
+    for side in (table.pareto.x, table.pareto.y):
+        if side not in known or side == "peak":
+            raise ScenarioError(f"pareto: {side!r} is no term.{did_you_mean(side, known)}")
+        if side == "effort" and table.metrics.effort is None:
+            raise ScenarioError("pareto: effort needs metrics.effort, the signal that counts.")
+        if side in LOOP_METRICS and table.loop is None:
+            raise ScenarioError(f"pareto: {side} needs the table [loop].")
+    return ParetoSpec(table.pareto.x, table.pareto.y)
+
+
+def _line(table: TuneTable, space: ParameterSpace) -> LineSpec | None:
+    if table.line is None:
+        return None
+    for name in (table.line.numerator, table.line.denominator):
+        if name not in space.names:
+            raise ScenarioError(f"line: {name!r} is no parameter.{did_you_mean(name, space.names)}")
+    return LineSpec(**table.line.model_dump())
+
+
+def _surface(table: TuneTable, space: ParameterSpace) -> SurfaceSpec | None:
+    if table.surface is None:
+        return None
+    for name in table.surface.parameters:
+        if name not in space.names:
+            raise ScenarioError(
+                f"surface.parameters: {name!r} is no parameter.{did_you_mean(name, space.names)}"
+            )
+    a, b = table.surface.parameters
+    if a == b:
+        raise ScenarioError("surface.parameters needs two different parameters.")
+    return SurfaceSpec((a, b), table.surface.points)
+
+
+def _simulation(table: TuneTable) -> SimulationSpec:
+    values = table.simulation.model_dump()
+    if values["step"] is not None:
+        raise ScenarioError("simulation.step has no meaning here; the command has its own step.")
+    return SimulationSpec(memory_mb=values.pop("memory"), **values)

@@ -1,0 +1,229 @@
+"""What a tuning scenario is once it is read: frozen objects in the FMU's units."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Literal
+
+from thsa_cosim.fmu import FmuDescription
+from thsa_cosim.parameters import ParameterSpace
+from thsa_cosim.scenario.model import SearchSpec, SimulationSpec
+from thsa_cosim.signals import FloatArray
+from thsa_cosim.units import convert
+
+#: Metric → (unit, scale of an excess that counts as 1).
+METRICS = {
+    "rise_time": ("s", 0.1),
+    "steady_state_error": ("1", 1e-3),
+    "overshoot": ("1", 0.01),
+    "settling_time": ("s", 0.1),
+    "tracking_error": ("", 1.0),
+    "peak": ("", 1.0),
+    "effort": ("", 1.0),
+    "gain_margin": ("dB", 10.0),
+    "phase_margin": ("deg", 10.0),
+    "bandwidth": ("Hz", 10.0),
+}
+LOOP_METRICS = ("gain_margin", "phase_margin", "bandwidth")
+TERMS = ("tracking", *METRICS)
+
+
+@dataclass(frozen=True, eq=False)
+class CommandSpec:
+    """The command: ``time`` (n,) in s and ``values`` (n,) in the input's unit; it starts to move at ``begin``.
+
+    ``output`` should follow; ``factor`` turns its unit into that of the input.
+    """
+
+    input: str
+    output: str
+    unit: str
+    time: FloatArray
+    values: FloatArray
+    begin: float
+    factor: float
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One condition's values in ``unit`` (as in the scenario) with their weights; the FMU's unit differs."""
+
+    name: str
+    unit: str
+    fmu_unit: str
+    values: tuple[float, ...]
+    weights: tuple[float, ...]
+
+    def to_fmu(self, value: float) -> float:
+        """Return ``value`` [unit] in the FMU input's unit."""
+        return convert(value, self.unit, self.fmu_unit) if self.unit != self.fmu_unit else value
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Constant inputs: ``shown`` in the scenario's units, ``inputs`` in the FMU's."""
+
+    shown: Mapping[str, float]
+    inputs: Mapping[str, float]
+    weight: float
+
+    @property
+    def label(self) -> str:
+        """Short name, such as ``T_amb=-30 F_load=55``; empty for no condition."""
+        return " ".join(f"{name}={value:.10g}" for name, value in self.shown.items())
+
+
+def combinations(axes: Sequence[Axis]) -> tuple[Condition, ...]:
+    """Every combination of the axes' values, the last axis running fastest; weights multiply."""
+    conditions = []
+    for picks in product(*(range(len(axis.values)) for axis in axes)):
+        shown = {a.name: a.values[k] for a, k in zip(axes, picks, strict=True)}
+        weight = 1.0
+        for axis, k in zip(axes, picks, strict=True):
+            weight *= axis.weights[k]
+        conditions.append(Condition(shown, {a.name: a.to_fmu(shown[a.name]) for a in axes}, weight))
+    return tuple(conditions)
+
+
+@dataclass(frozen=True)
+class MetricsSpec:
+    """How a response is read: rise time, window of e_ss [s], settling band, the signal of the effort."""
+
+    rise: Literal["first-reach", "between"]
+    fraction: float
+    low: float
+    high: float
+    window: tuple[float, float]
+    settling_band: float
+    effort: str | None
+
+
+@dataclass(frozen=True)
+class ControlCostSpec:
+    """Eq. 7: velocity errors are divided by ``scale`` (one ``unit`` in the command input's unit)."""
+
+    unit: str
+    scale: float
+    kappa_rise: float
+    kappa_steady: float
+    signed: bool
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A limit on a metric, in ``unit``; ``scale`` is the excess that counts as 1."""
+
+    metric: str
+    signal: str | None
+    unit: str
+    limit: float
+    upper: bool
+    hard: bool
+    penalty: float
+    scale: float
+
+    @property
+    def name(self) -> str:
+        """``overshoot`` or, for the peak of a signal, ``peak.i_q``."""
+        return self.metric if self.signal is None else f"{self.metric}.{self.signal}"
+
+
+@dataclass(frozen=True)
+class LoopSpec:
+    """The loop is opened at ``signal``; linearised with the response's state at ``at`` [s]."""
+
+    signal: str
+    at: float
+
+
+@dataclass(frozen=True, eq=False)
+class CovariancePoint:
+    """An identification's standard errors (n,), in its units, and correlation (n, n) at one temperature."""
+
+    temperature_degC: float | None
+    stderr: FloatArray
+    correlation: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class UncertaintySpec:
+    """Samples of FMU parameters around their values.
+
+    ``variables`` are shifted, one per identified parameter; ``factors`` turn its unit into the FMU's. The
+    condition ``temperature`` picks the nearest point.
+    """
+
+    samples: int
+    temperature: str | None
+    variables: tuple[str, ...]
+    factors: tuple[float, ...]
+    points: tuple[CovariancePoint, ...]
+
+
+@dataclass(frozen=True)
+class ScheduleSpec:
+    """Gains over the conditions ``over``; ``check`` holds the axes of the sweep."""
+
+    over: tuple[str, ...]
+    smoothing: float
+    check: tuple[Axis, ...]
+
+
+@dataclass(frozen=True)
+class ParetoSpec:
+    """Two terms to be small at once."""
+
+    x: str
+    y: str
+
+
+@dataclass(frozen=True)
+class LineSpec:
+    """The ratio of two parameters over the last generations, and a published one."""
+
+    numerator: str
+    denominator: str
+    generations: int
+    published: float | None
+
+
+@dataclass(frozen=True)
+class SurfaceSpec:
+    """The plane of two parameters over which the cost is drawn."""
+
+    parameters: tuple[str, str]
+    points: int
+
+
+@dataclass(frozen=True, eq=False)
+class TuneScenario:
+    """What to tune, and for what.
+
+    ``before`` and ``compare`` hold values of all parameters in the parameters' units; they may lie outside the
+    bounds. ``fixed`` are FMU start values (FMU units).
+    """
+
+    path: Path
+    title: str
+    seed: int
+    fmu: FmuDescription
+    fixed: Mapping[str, float]
+    command: CommandSpec
+    axes: tuple[Axis, ...]
+    parameters: ParameterSpace
+    before: Mapping[str, float]
+    compare: Mapping[str, Mapping[str, float]]
+    metrics: MetricsSpec
+    cost: ControlCostSpec
+    requirements: tuple[Requirement, ...]
+    loop: LoopSpec | None
+    combine: Literal["worst", "sum"]
+    uncertainty: UncertaintySpec | None
+    schedule: ScheduleSpec | None
+    pareto: ParetoSpec | None
+    line: LineSpec | None
+    surface: SurfaceSpec | None
+    search: SearchSpec
+    simulation: SimulationSpec
+    kind: str = "tune"

@@ -139,7 +139,9 @@ class ClusterRunner:
         index_of = {future.key: i for future, i in zip(futures, indexes, strict=True)}
         lost = []
         try:
-            done = self._distributed.as_completed(futures, with_results=True, raise_errors=False)
+            done = self._distributed.as_completed(
+                futures, loop=self._client.loop, with_results=True, raise_errors=False
+            )
             for future, result in done:
                 index = index_of[future.key]
                 if future.status == "finished":

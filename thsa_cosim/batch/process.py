@@ -22,7 +22,10 @@ from thsa_cosim.batch.memory import resident_bytes
 from thsa_cosim.batch.worker import GROWTH, PROGRESS_SLOTS, SERIAL, read_console
 from thsa_cosim.fmu.instance import Phase
 
-_BOOT = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from thsa_cosim.batch.worker import main; main()"
+_BOOT = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+    "from thsa_cosim.batch.worker import main; main(sys.argv[2])"
+)
 _ONE_THREAD = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -71,10 +74,11 @@ class WorkerProcess:
         (folder / "cwd").mkdir(parents=True)
         self._progress_path = folder / "progress"
         self._progress_path.write_bytes(bytes(8 * PROGRESS_SLOTS))
+        paths = [str(Path(p).absolute()) for p in sys.path]
         environment = os.environ | dict.fromkeys(_ONE_THREAD, "1")
         with (folder / "console").open("ab") as console:
             self._process = subprocess.Popen(
-                [sys.executable, "-c", _BOOT, json.dumps([str(Path(p).absolute()) for p in sys.path])],
+                [sys.executable, "-c", _BOOT, json.dumps(paths), setup.root],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=console,

@@ -1,8 +1,6 @@
 """The temporary folder of one runner: each FMU unpacked once, each experiment written once."""
 
 import pickle
-import shutil
-import tempfile
 from collections.abc import Sequence
 from multiprocessing import spawn
 from pathlib import Path
@@ -14,6 +12,7 @@ from thsa_cosim.batch.runner import by_name, check_experiment
 from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.description import FmuDescription, read_description
+from thsa_cosim.fmu.scratch import ScratchFolder
 
 
 class Study:
@@ -29,7 +28,8 @@ class Study:
         self.descriptions: dict[str, FmuDescription | None] = {}
         self.failures: dict[str, Outcome] = {}
         self.main: dict[str, Any] | None = None
-        self.folder = Path(tempfile.mkdtemp(prefix="thsa-cosim-"))
+        self._scratch = ScratchFolder()
+        self.folder = self._scratch.path
         try:
             self._prepare()
         except BaseException:
@@ -73,4 +73,4 @@ class Study:
 
     def remove(self) -> None:
         """Remove the folder."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        self._scratch.remove()

@@ -17,7 +17,7 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 
@@ -64,18 +64,9 @@ class Worker:
                 self._orders.put(message)
                 if isinstance(message, Stop):
                     return
-            self.parent_died()
+            parent_died(self._setup.root)
 
         threading.Thread(target=listen, daemon=True).start()
-
-    def parent_died(self) -> None:
-        """Remove the study's folder, as nobody else will, and end at once, whatever the FMU is doing."""
-        with contextlib.suppress(OSError):
-            os.chdir("/")
-        shutil.rmtree(self._setup.root, ignore_errors=True)
-        if hasattr(os, "killpg"):
-            os.killpg(0, signal.SIGKILL)  # this worker and whatever its FMU has started
-        os._exit(1)
 
     def serve(self) -> None:
         """Run orders until told to stop."""
@@ -93,7 +84,7 @@ class Worker:
             try:
                 write_frame(self._results, done)
             except OSError:
-                self.parent_died()
+                parent_died(self._setup.root)
             self._progress[SERIAL] = 0.0
             if leaves:
                 break
@@ -208,15 +199,25 @@ def _to_stderr(line: str) -> None:
     os.write(2, line.encode("utf-8", "replace"))
 
 
-def main() -> None:
-    """Entry point of the process."""
+def parent_died(root: str) -> NoReturn:
+    """Remove the study's folder, as nobody else will, and end at once, whatever the FMU is doing."""
+    with contextlib.suppress(OSError):
+        os.chdir("/")
+    shutil.rmtree(root, ignore_errors=True)
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)  # this worker and whatever its FMU has started
+    os._exit(1)
+
+
+def main(root: str) -> None:
+    """Entry point of the process; ``root`` is the study's folder."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     no_core_files()
     # The pipes move to other descriptors (not inherited by what an FMU starts); 0, 1, 2 become harmless.
     orders, results = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     setup = read_frame(orders)
     if not isinstance(setup, Setup):
-        return
+        parent_died(root)
     null = os.open(os.devnull, os.O_RDONLY)
     os.dup2(null, 0)
     os.close(null)

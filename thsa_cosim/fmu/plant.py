@@ -1,8 +1,6 @@
 """An opened FMU that can be run again and again."""
 
 import importlib
-import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -17,6 +15,7 @@ from thsa_cosim.fmu.fmi2 import Fmi2Instance
 from thsa_cosim.fmu.fmi3 import Fmi3Instance
 from thsa_cosim.fmu.instance import Instance, Phase
 from thsa_cosim.fmu.native import MessageSink
+from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.fmu.stepping import IntermediateUpdate, Plan, check_names, step_through
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -42,13 +41,14 @@ class Plant:
         kind: Kind | None = None,
         backend: Backend | None = None,
         reuse: Reuse = "fresh",
-        owns_folder: bool = False,
+        scratch: ScratchFolder | None = None,
         progress: FloatArray | None = None,
         on_message: MessageSink | None = None,
     ) -> None:
         """Take an FMU that is already unpacked into ``folder``; ``Plant.open`` is the usual way in.
 
-        ``progress`` (4,) is written while running: phase, time [s], step, unused.
+        ``scratch`` holds ``folder`` and is removed by ``close``. ``progress`` (4,) is written while running:
+        phase, time [s], step, unused.
         """
         self.description = description
         self.folder = folder
@@ -69,7 +69,7 @@ class Plant:
         self.backend: Backend = backend or _default_backend()
         self.reuse: Reuse = reuse
         self.progress = np.zeros(4) if progress is None else progress
-        self._owns_folder = owns_folder
+        self._scratch = scratch
         self._on_message = on_message
         self._instance: Instance | None = None
         self._plans: dict[Any, tuple[Any, Any]] = {}
@@ -105,7 +105,8 @@ class Plant:
             If the file is no usable FMU or lacks ``kind``.
         """
         description = read_description(path)
-        folder = Path(tempfile.mkdtemp(prefix="thsa-cosim-plant-"))
+        scratch = ScratchFolder()
+        folder = scratch.path / "fmu"
         try:
             unpack(Path(path), folder)
             return cls(
@@ -114,11 +115,11 @@ class Plant:
                 kind=kind,
                 backend=backend,
                 reuse=reuse,
-                owns_folder=True,
+                scratch=scratch,
                 on_message=on_message,
             )
         except BaseException:
-            shutil.rmtree(folder, ignore_errors=True)
+            scratch.remove()
             raise
 
     def run(
@@ -265,8 +266,8 @@ class Plant:
         self._free()
         self._instance = None
         self._plans.clear()
-        if self._owns_folder:
-            shutil.rmtree(self.folder, ignore_errors=True)
+        if self._scratch is not None:
+            self._scratch.remove()
 
     def __enter__(self) -> Self:
         return self

@@ -1,0 +1,96 @@
+"""The use case behind ``thsa-cosim simulate``."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from fmu_sources import build
+from test_fmu_plant import lag
+
+from thsa_cosim.errors import StudyError
+from thsa_cosim.scenario import load_scenario
+from thsa_cosim.simulate import simulate
+
+TIME = np.linspace(0.0, 1.0, 201)
+INPUT = np.sin(5.0 * TIME)
+NOISE = 1e-3
+
+
+@pytest.fixture
+def scenario_file(tmp_path: Path) -> Path:
+    random = np.random.default_rng(5)
+    for name, tau in (("first", 0.1), ("second", 0.3)):
+        y = lag(TIME, INPUT, tau, 1.0) + NOISE * random.normal(size=TIME.size)
+        pd.DataFrame({"t": TIME, "command": INPUT, "speed": y}).to_csv(tmp_path / f"{name}.csv", index=False)
+    path = tmp_path / "scenario.toml"
+    path.write_text(
+        f"""
+        kind = "simulate"
+        fmu = "{build.lag2()}"
+        [recordings]
+        fit = ["first.csv"]
+        validate = ["second.csv"]
+        [recordings.time]
+        column = "t"
+        unit = "s"
+        [recordings.columns.u]
+        column = "command"
+        unit = "m/s"
+        [recordings.columns.y]
+        column = "speed"
+        unit = "m/s"
+        [fixed]
+        tau = 0.1
+        [simulation]
+        deadline = 5.0
+        """
+    )
+    return path
+
+
+def test_every_recording_is_simulated_and_compared(scenario_file: Path, tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    folder = tmp_path / "study"
+    result = simulate(
+        load_scenario(scenario_file), folder=folder, workers=2, on_recording=lambda *n: told.append(n)
+    )
+    assert told == [(1, 2), (2, 2)]
+    first, second = result.recordings
+    assert (first.role, second.role) == ("fit", "validate")
+    # The first recording was made with this time constant, the second with three times as much.
+    assert first.errors["y"].rmse == pytest.approx(NOISE, rel=0.15)
+    assert first.errors["y"].noise == pytest.approx(NOISE, rel=0.3)
+    assert second.errors["y"].rmse > 50 * NOISE
+    assert second.errors["y"].unit == "m/s"
+    content = json.loads((folder / "result.json").read_text())
+    assert content == result.to_dict()
+    assert content["kind"] == "simulate"
+    assert content["failures"] == {}
+    table = pd.read_csv(folder / "fit_first.csv")
+    assert list(table.columns)[:3] == ["time [s]", "y [m/s]", "y measured [m/s]"]
+    assert np.max(np.abs(table["y [m/s]"] - lag(TIME, INPUT, 0.1, 1.0))) < 1e-12
+
+
+def test_communication_step_of_the_scenario(scenario_file: Path, tmp_path: Path) -> None:
+    scenario_file.write_text(scenario_file.read_text() + "\nstep = 0.01\n")
+    result = simulate(load_scenario(scenario_file), folder=tmp_path / "study")
+    simulated = result.recordings[0].simulated
+    assert simulated is not None
+    assert simulated.time.size == 101
+    assert result.recordings[0].errors["y"].rmse < 2e-3
+
+
+def test_failures_are_part_of_the_result_unless_all_fail(scenario_file: Path, tmp_path: Path) -> None:
+    good = scenario_file.read_text()
+    scenario_file.write_text(good.replace("tau = 0.1", f"tau = 0.1\nfault = {build.FAULTS['nan']}\nat = 0.9"))
+    short = pd.read_csv(tmp_path / "first.csv").iloc[:150]
+    short.to_csv(tmp_path / "first.csv", index=False)
+    result = simulate(load_scenario(scenario_file), folder=tmp_path / "study", workers=1)
+    assert [r.status for r in result.recordings] == ["ok", "not-finite"]
+    assert list(result.failures.values()) == [1]
+    assert result.recordings[1].errors == {}
+    scenario_file.write_text(good.replace("tau = 0.1", f"tau = 0.1\nfault = {build.FAULTS['error']}\nat = 0"))
+    with pytest.raises(StudyError, match="All 2 simulations failed, 2 of them because fmi2DoStep returned"):
+        simulate(load_scenario(scenario_file), folder=tmp_path / "other", workers=1)

@@ -24,7 +24,22 @@ def file_name(text: str) -> str:
 def plot_law(law: LawResult, result: IdentifyResult, path: Path) -> None:
     """Points with 95 % error bars, the fitted law with its band, and the published curve."""
     figure = Figure(figsize=(7.0, 4.6), layout="constrained")
-    axes = figure.add_subplot()
+    _draw_law(figure.add_subplot(), law, result)
+    _save(figure, path)
+
+
+def plot_laws(result: IdentifyResult, path: Path) -> None:
+    """All laws of an identification on one sheet."""
+    laws = list(result.laws.values())
+    columns = min(2, len(laws))
+    rows = -(-len(laws) // columns)
+    figure = Figure(figsize=(6.0 * columns, 3.9 * rows), layout="constrained")
+    for k, law in enumerate(laws):
+        _draw_law(figure.add_subplot(rows, columns, k + 1), law, result)
+    _save(figure, path)
+
+
+def _draw_law(axes: Axes, law: LawResult, result: IdentifyResult) -> None:
     points = [p for p in result.points if p.temperature_degC is not None]
     t = np.array([p.temperature_degC for p in points], dtype=np.float64)
     estimates = [p.parameters[law.parameter] for p in points]
@@ -39,18 +54,22 @@ def plot_law(law: LawResult, result: IdentifyResult, path: Path) -> None:
     if np.isfinite(band).all():
         axes.fill_between(grid, curve - band, curve + band, color=SIMULATED, alpha=0.15, lw=0)
     axes.plot(grid, curve, color=SIMULATED, lw=1.4, label=f"fitted ({law.law.form})")
-    axes.errorbar(
-        t[sure],
-        values[sure],
-        yerr=1.96 * errors[sure],
-        fmt="o",
-        ms=5,
-        capsize=3,
-        color="black",
-        label="identified, 95 %",
-    )
-    if not sure.all():
-        axes.plot(t[~sure], values[~sure], "o", ms=6, mfc="none", color="black", label="not determined")
+    for chosen, face, label in (
+        (sure, "black", "identified, 95 %"),
+        (~sure, "white", "not determined, 95 %"),
+    ):
+        if chosen.any():
+            axes.errorbar(
+                t[chosen],
+                values[chosen],
+                yerr=1.96 * np.nan_to_num(errors[chosen]),
+                fmt="o",
+                ms=5,
+                mfc=face,
+                capsize=3,
+                color="black",
+                label=label,
+            )
     axes.set_xlabel("temperature [°C]")
     axes.set_ylabel(f"{law.parameter} [{law.unit}]")
     title = f"{law.parameter} over temperature"
@@ -61,7 +80,6 @@ def plot_law(law: LawResult, result: IdentifyResult, path: Path) -> None:
     axes.set_title(title, fontsize=11)
     axes.legend(frameon=False)
     _tidy(axes)
-    _save(figure, path)
 
 
 def plot_comparison(comparison: Comparison, path: Path) -> None:

@@ -21,7 +21,7 @@ def write_identify(
     """Write result.json, parameters.csv, laws.csv and the plots; return what was written, in order."""
     # matplotlib takes half a second to import: not before the study has run.
     from thsa_cosim.report.friction import write_friction
-    from thsa_cosim.report.plots import file_name, plot_comparison, plot_convergence, plot_law
+    from thsa_cosim.report.plots import file_name, plot_comparison, plot_convergence, plot_law, plot_laws
 
     written: list[Path] = []
 
@@ -47,6 +47,9 @@ def write_identify(
         path = plots / f"law_{file_name(law.parameter)}.png"
         plot_law(law, result, path)
         note(path)
+    if len(result.laws) > 1:
+        plot_laws(result, plots / "laws.png")
+        note(plots / "laws.png")
     temperatures = [p.temperature_degC for p in result.points if p.temperature_degC is not None]
     if temperatures:
         for path in write_friction(folder, result.laws, min(temperatures), max(temperatures)):

@@ -4,7 +4,7 @@ model Stabilizer "Moving mass of nut and stabilizer against the aerodynamic forc
   THSA.Interfaces.RealInput F_load(unit="N") "Aerodynamic force, positive opposes positive velocity";
   parameter THSA.Units.Mass M(min=0.001, max=1e6) = 200 "Moving mass reduced to the nut";
   THSA.Units.Position x(start=0, fixed=false, nominal=1e-2) "Position";
-  THSA.Units.Velocity v(start=0, fixed=true, nominal=1e-3) "Velocity";
+  THSA.Units.Velocity v(start=0, fixed=true, nominal=1e-2) "Velocity";
 equation
   x = flange.s;
   v = der(x);

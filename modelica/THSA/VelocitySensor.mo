@@ -1,7 +1,7 @@
 within THSA;
 model VelocitySensor "Velocity sensor with first-order filter"
   THSA.Interfaces.TranslationalFlange flange "Measured point";
-  THSA.Interfaces.RealOutput y(unit="m/s", start=0, fixed=true, nominal=1e-3) "Measured velocity";
+  THSA.Interfaces.RealOutput y(unit="m/s", start=0, fixed=true, nominal=1e-2) "Measured velocity";
   parameter THSA.Units.Time tau_v(min=1e-6, max=10) = 0.010 "Time constant";
 equation
   tau_v*der(y) = der(flange.s) - y;

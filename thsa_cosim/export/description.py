@@ -22,12 +22,14 @@ LOG_CATEGORIES = {
 FMI2_CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": "true",
     "canInterpolateInputs": "true",
+    "canNotUseMemoryManagementFunctions": "true",
     "maxOutputDerivativeOrder": "1",
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
     "providesDirectionalDerivative": "true",
 }
 FMI2_MODEL_EXCHANGE = {
+    "canNotUseMemoryManagementFunctions": "true",
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
     "providesDirectionalDerivative": "true",

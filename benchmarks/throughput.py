@@ -23,7 +23,8 @@ import numpy as np
 from thsa_cosim.batch import Experiment, Job, LocalRunner
 from thsa_cosim.fmu import Plant
 from thsa_cosim.fmu.compiled import advance
-from thsa_cosim.fmu.stepping import Plan, _address_table
+from thsa_cosim.fmu.plan import Plan
+from thsa_cosim.fmu.stepping import Tables
 from thsa_cosim.signals import Signals
 
 OUTPUTS = ("v", "i_q")
@@ -94,24 +95,9 @@ def bare_loop(fmu: str, pipe: "multiprocessing.connection.Connection") -> None:
         instance = plant._instance
         plan = Plan(instance, drive, OUTPUTS, drive.time)
         settable = plant._settable(instance, tuple(first))
-        rows = [(c, np.empty((len(drive.time), len(c.references)))) for c in plan.output_channels]
-        sets, ends = _address_table(instance, "Set", plan.begin), _address_table(instance, "Set", plan.end)
-        gets = _address_table(instance, "Get", rows)
-        channel, _, table, orders = plan.smooth
-        function = instance.library.function("fmi2SetRealInputDerivatives")
-        slopes = np.array(
-            [
-                instance.library.address(function),
-                channel.references.ctypes.data,
-                len(channel.references),
-                orders.ctypes.data,
-                table.ctypes.data,
-                table.strides[0],
-            ]
-        )
-        do_step = instance.library.address(instance.library.function("fmi2DoStep"))
-        times, steps, stop = plan.grid.times, plan.grid.steps, plan.grid.stop
-        flags, last, progress = np.zeros(8, dtype=np.uint8), np.zeros(1), np.zeros(4)
+        tables = Tables(instance, plan)
+        times, stop = plan.grid.times, plan.grid.stop
+        progress = np.zeros(4)
         while (batch := pipe.recv()) is not None:
             vectors = [np.array(list(values.values())) for values in batch]
             begin = time.perf_counter()
@@ -121,21 +107,7 @@ def bare_loop(fmu: str, pipe: "multiprocessing.connection.Connection") -> None:
                 instance.initialize_begin(times[0], stop, None)
                 instance.set_values(plan.input_channels, plan.first)
                 instance.initialize_end()
-                _, what, _ = advance(
-                    2,
-                    instance.handle,
-                    do_step,
-                    times,
-                    steps,
-                    sets,
-                    slopes,
-                    ends,
-                    gets,
-                    rows[0][1],
-                    flags,
-                    last,
-                    progress,
-                )
+                _, what, _ = tables.advance(advance, instance, plan, progress)
                 assert what == 0
                 instance.terminate()
                 instance.free()

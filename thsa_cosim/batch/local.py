@@ -46,7 +46,7 @@ class LocalRunner:
         reuse: Reuse = "fresh",
         kind: Kind | None = None,
         backend: Backend | None = None,
-        recycle_runs: int = 2000,
+        recycle_runs: int = 10_000,
         recycle_growth_mb: float = 512.0,
         console_limit: int = 8192,
     ) -> None:

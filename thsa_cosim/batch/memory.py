@@ -3,15 +3,16 @@
 import contextlib
 import os
 import sys
-from pathlib import Path
 
 _PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 
 
 def _statm(pid: int | str) -> list[int]:
-    with contextlib.suppress(OSError, ValueError):
-        return [int(field) * _PAGE for field in Path(f"/proc/{pid}/statm").read_text().split()]
-    return [0] * 7
+    try:
+        with open(f"/proc/{pid}/statm", "rb", buffering=0) as file:  # noqa: PTH123 - read very often
+            return [int(field) * _PAGE for field in file.read().split()]
+    except (OSError, ValueError):
+        return [0] * 7
 
 
 def resident_bytes(pid: int | str = "self") -> int:

@@ -1,6 +1,7 @@
 """What became of one job."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from thsa_cosim.fmu.failure import Status
 from thsa_cosim.signals import FloatArray, Signals
@@ -23,7 +24,22 @@ class Outcome:
     console: str = ""
     """What native code wrote to stdout and stderr, cut to a few thousand characters."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Half the time of the default; every outcome travels.
+        return _outcome, (
+            str(self.status),
+            self.reason,
+            self.signals,
+            self.reduced,
+            self.duration_s,
+            self.console,
+        )
+
     @property
     def ok(self) -> bool:
         """Whether the run succeeded."""
         return self.status is Status.OK
+
+
+def _outcome(status: str, *rest: Any) -> Outcome:
+    return Outcome(Status(status), *rest)

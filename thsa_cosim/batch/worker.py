@@ -55,6 +55,7 @@ class Worker:
         self._orders: queue.SimpleQueue[Order | Stop] = queue.SimpleQueue()
         self._libc = None if os.name == "nt" else ctypes.CDLL(None)
         self._floor = 0
+        self._next_look, self._resident = 0.0, 0
 
     def listen(self, orders: BinaryIO) -> None:
         """Start the thread that reads orders ahead and notices when the parent dies."""
@@ -80,7 +81,7 @@ class Worker:
             self._progress[: GROWTH + 1] = (Phase.LOAD, np.nan, 0.0, 0.0, order.serial, 0.0)
             outcome = self._run(order)
             leaves = self._live is not None and self._live.is_dead
-            done = Done(order.serial, outcome, resident_bytes(), leaves)
+            done = Done(order.serial, outcome, self._rss(), leaves)
             try:
                 write_frame(self._results, done)
             except OSError:
@@ -90,6 +91,13 @@ class Worker:
                 break
         if self._live is not None and not self._live.is_dead:
             self._live.close()
+
+    def _rss(self) -> int:
+        """Resident bytes, looked up a few times per second at most."""
+        now = time.monotonic()
+        if now >= self._next_look:
+            self._next_look, self._resident = now + 0.2, resident_bytes()
+        return self._resident
 
     def _warm_up(self) -> None:
         """Load machine code before the first deadline starts to count."""

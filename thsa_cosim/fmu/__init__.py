@@ -2,9 +2,10 @@
 
 ``description``  what an FMU says about itself
 ``plant``        an opened FMU: run it with start values and inputs
+``inputs``       how sampled inputs reach an FMU; ``plan`` the tables made of them
 ``stepping``     the Co-Simulation loop; ``compiled`` the same in machine code
 ``exchange``     the integrator for Model Exchange
-``inputs``       how sampled inputs reach an FMU
+``fmi1`` ...     the versions of the FMI; ``instance`` what 2.0 and 3.0 have in common
 """
 
 from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription, Variable, read_description

@@ -226,7 +226,7 @@ def advance(version, handle, do_step, times, steps, sets, slopes, ends, gets, fl
 def intermediate_update(
     environment, time, set_requested, _get_allowed, _step_finished, _can_return_early, early, _early_time
 ):
-    """fmi3IntermediateUpdateCallback: set u(time); ``environment`` is laid out by ``stepping``."""
+    """fmi3IntermediateUpdateCallback: set u(time); ``environment`` is laid out by ``intermediate``."""
     if early != 0:
         carray(_as_pointer(early), 1, dtype=np.uint8)[0] = 0
     block = carray(environment, 9, dtype=np.int64)

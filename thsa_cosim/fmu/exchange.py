@@ -16,7 +16,7 @@ from thsa_cosim.fmu.cvode import Cvode
 from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.inputs import sampled
 from thsa_cosim.fmu.instance import Instance, Phase
-from thsa_cosim.fmu.stepping import Plan
+from thsa_cosim.fmu.plan import Plan
 from thsa_cosim.signals import FloatArray, Signals
 
 _SAFETY = 0.1

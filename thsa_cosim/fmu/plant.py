@@ -14,9 +14,11 @@ from thsa_cosim.fmu.description import FmuDescription, read_description
 from thsa_cosim.fmu.fmi2 import Fmi2Instance
 from thsa_cosim.fmu.fmi3 import Fmi3Instance
 from thsa_cosim.fmu.instance import Instance, Phase
+from thsa_cosim.fmu.intermediate import IntermediateUpdate
 from thsa_cosim.fmu.native import MessageSink
+from thsa_cosim.fmu.plan import Plan
 from thsa_cosim.fmu.scratch import ScratchFolder
-from thsa_cosim.fmu.stepping import IntermediateUpdate, Plan, check_names, step_through
+from thsa_cosim.fmu.stepping import check_names, step_through
 from thsa_cosim.signals import FloatArray, Signals
 
 Kind = Literal["co-simulation", "model-exchange"]

@@ -1,8 +1,8 @@
 """Co-Simulation of FMI 2.0 and 3.0: set inputs, do a step, get outputs.
 
-``Plan`` holds everything that is the same in every run of one experiment (tables of input values and
-of addresses); ``step_through`` runs it. Two loops do the same calls in the same order: machine code
-(``compiled.advance``) and ``advance_python``, the reference, which it equals bit for bit.
+``Tables`` holds the addresses and buffers of one experiment (``plan.Plan``); ``step_through`` runs it. Two
+loops do the same calls in the same order: machine code (``compiled.advance``) and ``advance_python``, the
+reference, which it equals bit for bit.
 """
 
 import ctypes
@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from thsa_cosim.errors import ParameterError
 from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.fmi2 import Fmi2Instance
-from thsa_cosim.fmu.fmi3 import Fmi3Instance
-from thsa_cosim.fmu.inputs import communication_grid, input_mode, input_variables, is_linear, sampled
 from thsa_cosim.fmu.instance import Channel, Instance, Phase
+from thsa_cosim.fmu.plan import Plan
 from thsa_cosim.signals import FloatArray, Signals
 
 IntArray = NDArray[np.int64]
@@ -27,17 +26,6 @@ _ACCESS2 = ctypes.CFUNCTYPE(_INT, _SIZE, _SIZE, _SIZE, _SIZE)
 _ACCESS3 = ctypes.CFUNCTYPE(_INT, _SIZE, _SIZE, _SIZE, _SIZE, _SIZE)
 _STEP2 = ctypes.CFUNCTYPE(_INT, _SIZE, _DOUBLE, _DOUBLE, _INT)
 _STEP3 = ctypes.CFUNCTYPE(_INT, _SIZE, _DOUBLE, _DOUBLE, ctypes.c_bool, _SIZE, _SIZE, _SIZE, _SIZE)
-_UPDATE = ctypes.CFUNCTYPE(
-    None,
-    ctypes.c_void_p,
-    _DOUBLE,
-    ctypes.c_bool,
-    ctypes.c_bool,
-    ctypes.c_bool,
-    ctypes.c_bool,
-    _SIZE,
-    _SIZE,
-)
 
 
 def advance_python(
@@ -113,59 +101,6 @@ def advance_python(
     return len(steps), 0, 0
 
 
-class Plan:
-    """One experiment prepared for one instance: communication points, input tables, output channels."""
-
-    def __init__(
-        self, instance: Instance, inputs: Signals | None, outputs: Sequence[str], time: FloatArray
-    ) -> None:
-        description = instance.description
-        self.grid = communication_grid(time)
-        self.outputs = tuple(outputs)
-        variables = input_variables(description, inputs)
-        self.input_channels = instance.channels(variables)
-        output_variables = [description.variable(name) for name in outputs]
-        self.output_channels = instance.channels(output_variables)
-        self.units = {v.name: v.unit or "1" for v in output_variables}
-        linear = np.array([is_linear(inputs, v) for v in variables], dtype=bool)
-        self.mode = input_mode(description, [v for v, yes in zip(variables, linear, strict=True) if yes])
-        table = sampled(inputs, variables, self.grid.times)
-        self.first = table[0] if variables else np.empty(0)
-        moves = (table != table[0]).any(axis=0)
-        begin = table.copy()
-        if self.mode == "mean":
-            begin[:-1, linear] = 0.5 * (table[:-1, linear] + table[1:, linear])
-        self.begin = self._rows(begin)
-        # With slopes given, linear inputs have arrived at u(t_k+1) by themselves.
-        arrives = linear if self.mode == "derivative" else np.zeros_like(linear)
-        self.end = self._rows(table) if (moves & ~arrives).any() else []
-        uses_slopes = self.mode != "mean" and (moves & linear).any()
-        self.smooth = self._smooth_channel(table, linear) if uses_slopes else None
-        self.inputs, self.input_variables, self.linear = inputs, variables, linear
-
-    def _rows(self, table: FloatArray) -> list[tuple[Channel, NDArray[Any]]]:
-        """One contiguous (n, variables) table per data type."""
-        return [
-            (channel, np.ascontiguousarray(table[:, list(channel.columns)].astype(channel.dtype)))
-            for channel in self.input_channels
-        ]
-
-    def _smooth_channel(
-        self, table: FloatArray, linear: NDArray[np.bool_]
-    ) -> tuple[Channel, FloatArray, FloatArray, NDArray[np.int32]] | None:
-        """Linear double inputs: channel, values (n, m), slopes (n-1, m), derivative orders (m,)."""
-        for channel in self.input_channels:
-            if channel.suffix not in ("Real", "Float64"):
-                continue
-            inside = [i for i, c in enumerate(channel.columns) if linear[c]]
-            columns = [channel.columns[i] for i in inside]
-            values = np.ascontiguousarray(table[:, columns])
-            slopes = np.ascontiguousarray(np.diff(values, axis=0) / self.grid.steps[:, None])
-            part = Channel(channel.suffix, channel.references[inside], channel.dtype, tuple(columns))
-            return part, values, slopes, np.ones(len(inside), dtype=np.int32)
-        return None
-
-
 def _address_table(instance: Instance, verb: str, rows: Sequence[tuple[Channel, NDArray[Any]]]) -> IntArray:
     table = np.zeros((len(rows), 5), dtype=np.int64)
     for i, (channel, values) in enumerate(rows):
@@ -175,114 +110,82 @@ def _address_table(instance: Instance, verb: str, rows: Sequence[tuple[Channel, 
     return table
 
 
-class IntermediateUpdate:
-    """The block of addresses that an FMI 3 intermediate update callback reads, and the callback."""
+class Tables:
+    """The addresses and buffers that the loop works on, for one plan and one FMU; reused by every run."""
 
-    def __init__(self, instance: Fmi3Instance, progress: FloatArray, compiled: bool) -> None:
-        self.block = np.zeros(9, dtype=np.int64)
-        self.block[7] = progress.ctypes.data
-        self._progress = progress
-        self._python = _UPDATE(self._update)
-        if compiled:
-            from thsa_cosim.fmu.compiled import intermediate_update
+    def __init__(self, instance: Instance, plan: Plan) -> None:
+        n = len(plan.grid.times)
+        self.results = [
+            (channel, np.zeros((n, len(channel.references)), dtype=channel.dtype))
+            for channel in plan.output_channels
+        ]
+        doubles = [table for channel, table in self.results if channel.dtype == np.float64]
+        self.floats = doubles[0] if doubles else np.empty((n, 0))
+        self.singles = any(channel.dtype == np.float32 for channel, _ in self.results)
+        self.sets = _address_table(instance, "Set", plan.begin)
+        self.ends = _address_table(instance, "Set", plan.end)
+        self.gets = _address_table(instance, "Get", self.results)
+        self.slopes = np.zeros(6, dtype=np.int64)
+        if plan.smooth is not None and plan.mode == "derivative":
+            channel, _, table, orders = plan.smooth
+            pointer = ctypes.c_void_p
+            prototype = (pointer, pointer, ctypes.c_size_t, pointer, pointer)
+            function = instance.library.function("fmi2SetRealInputDerivatives", *prototype)
+            address, references = instance.library.address(function), channel.references
+            row = address, references.ctypes.data, len(references), orders.ctypes.data
+            self.slopes[:] = *row, table.ctypes.data, table.strides[0]
+        self.do_step = instance.library.address(instance.library.function(f"{instance.prefix}DoStep"))
+        self.flags, self.last = np.zeros(8, dtype=np.uint8), np.zeros(1)
 
-            instance.intermediate_update = intermediate_update.address
-        else:
-            instance.intermediate_update = instance.library.address(self._python)
-        instance.environment = self.block.ctypes.data
-
-    def prepare(self, plan: Plan, instance: Fmi3Instance) -> None:
-        """Point the block at the tables of ``plan``; before instantiation."""
-        assert plan.smooth is not None
-        channel, values, slopes, _ = plan.smooth
-        setter = instance.library.address(instance.value_function("Set", channel.suffix))
-        references = channel.references
-        self.block[:7] = (
-            setter,
-            0,
-            references.ctypes.data,
-            len(references),
-            values.ctypes.data,
-            slopes.ctypes.data,
-            values.strides[0],
+    def advance(
+        self, loop: Any, instance: Instance, plan: Plan, progress: FloatArray
+    ) -> tuple[int, int, int]:
+        """Call ``advance_python`` or its compiled twin."""
+        version = 2 if instance.prefix == "fmi2" else 3
+        done, what, code = loop(
+            version,
+            instance.handle,
+            self.do_step,
+            plan.grid.times,
+            plan.grid.steps,
+            self.sets,
+            self.slopes,
+            self.ends,
+            self.gets,
+            self.floats,
+            self.flags,
+            self.last,
+            progress,
         )
-        self.block[8] = plan.grid.times.ctypes.data
-        self._plan = plan
-        instance.intermediate_references = references.tolist()
-
-    def _update(
-        self, _environment: int, time: float, wanted: bool, _g: bool, _f: bool, _c: bool, early: int, _t: int
-    ) -> None:
-        if early:
-            ctypes.c_bool.from_address(early).value = False
-        if not wanted or self._progress[0] != Phase.STEP:
-            return
-        assert self._plan.smooth is not None
-        k = int(self._progress[2])
-        _, values, slopes, _ = self._plan.smooth
-        now = values[k] + slopes[k] * (time - self._plan.grid.times[k])
-        setter, handle, references, count = self.block[:4].tolist()
-        _ACCESS3(setter)(handle, references, count, now.ctypes.data, count)
+        return int(done), int(what), int(code)
 
 
 def step_through(instance: Instance, plan: Plan, progress: FloatArray, compiled: bool) -> Signals:
     """Run an initialised instance through ``plan``; SimulationFailure if it does not reach the end."""
-    n = len(plan.grid.times)
-    version = 2 if instance.prefix == "fmi2" else 3
-    results = [
-        (channel, np.full((n, len(channel.references)), np.nan).astype(channel.dtype))
-        if channel.dtype.kind == "f"
-        else (channel, np.zeros((n, len(channel.references)), dtype=channel.dtype))
-        for channel in plan.output_channels
-    ]
-    doubles = [table for channel, table in results if channel.dtype == np.float64]
-    floats = doubles[0] if doubles else np.empty((n, 0))
-    gets = _address_table(instance, "Get", results)
-    slopes = np.zeros(6, dtype=np.int64)
-    if plan.smooth is not None and plan.mode == "derivative":
-        channel, _, table, orders = plan.smooth
-        pointer = ctypes.c_void_p
-        prototype = (pointer, pointer, ctypes.c_size_t, pointer, pointer)
-        function = instance.library.function("fmi2SetRealInputDerivatives", *prototype)
-        address, references = instance.library.address(function), channel.references
-        row = address, references.ctypes.data, len(references), orders.ctypes.data
-        slopes[:] = *row, table.ctypes.data, table.strides[0]
-    sets, ends = _address_table(instance, "Set", plan.begin), _address_table(instance, "Set", plan.end)
-    for (channel, _), row in zip(results, gets.tolist(), strict=True):
+    if plan.tables is None:
+        plan.tables = Tables(instance, plan)
+    tables: Tables = plan.tables
+    for channel, first in tables.results:
         getter = instance.value_function("Get", channel.suffix)
-        instance.check(instance.access(getter, row[1], row[2], row[3]), f"Get{channel.suffix}")
-    _refuse_not_finite(plan, results, 0)
-    do_step = instance.library.address(instance.library.function(f"{instance.prefix}DoStep"))
+        references = channel.references
+        code = instance.access(getter, references.ctypes.data, len(references), first.ctypes.data)
+        instance.check(code, f"Get{channel.suffix}")
+    _refuse_not_finite(plan, tables.results, 0)
     progress[0] = Phase.STEP
     if compiled:
         from thsa_cosim.fmu.compiled import advance as loop
     else:
         loop = advance_python
-    done, what, code = loop(
-        version,
-        instance.handle,
-        do_step,
-        plan.grid.times,
-        plan.grid.steps,
-        sets,
-        slopes,
-        ends,
-        gets,
-        floats,
-        np.zeros(8, dtype=np.uint8),
-        np.zeros(1),
-        progress,
-    )
+    done, what, code = tables.advance(loop, instance, plan, progress)
     if what:
-        _explain(instance, plan, results, int(done), int(what), int(code))
-    for k in range(n):
-        if all(table.dtype.kind != "f" or table is floats for _, table in results):
-            break
-        _refuse_not_finite(plan, results, k)
+        _explain(instance, plan, tables.results, done, what, code)
+    if tables.singles:  # the loop looks at doubles only
+        for k in range(len(plan.grid.times)):
+            _refuse_not_finite(plan, tables.results, k)
     values: dict[str, FloatArray] = {}
-    for channel, table in results:
+    for channel, table in tables.results:
         for i, column in enumerate(channel.columns):
-            values[plan.outputs[column]] = np.ascontiguousarray(table[:, i], dtype=np.float64)
+            values[plan.outputs[column]] = np.array(table[:, i], dtype=np.float64)
     return Signals(plan.grid.times, {name: values[name] for name in plan.outputs}, plan.units)
 
 

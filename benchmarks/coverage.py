@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -73,7 +73,7 @@ NOISE = {  # 1 sigma and quantum, in the column's unit
 
 
 def measured(
-    truth: Mapping[str, np.ndarray], temperature: float, seed: int, correlation: float
+    truth: Mapping[str, np.ndarray], temperature: float, seed: Sequence[int], correlation: float
 ) -> pd.DataFrame:
     """What the sensors make of the truth: first-order correlated noise of the stated size, quantised."""
     rng = np.random.default_rng(seed)
@@ -100,7 +100,7 @@ def run(
     for seed in range(seeds):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"{bench}.parquet"
-            measured(truth, temperature, seed, correlation).to_parquet(path)
+            measured(truth, temperature, (sorted(FOUND).index(bench), seed), correlation).to_parquet(path)
             scenario = load_scenario(REPO / "scenarios" / f"{bench}.toml", fit=[path], seed=seed)
             # The polish ends in the same minimum from a shorter search.
             short = replace(scenario.search, population=12, generations=5)

@@ -209,7 +209,7 @@ def _fit_polynomial(count: int, t: FloatArray, y: FloatArray, sigma: FloatArray)
 def _fit_exponentials(terms: int, t: FloatArray, y: FloatArray, sigma: FloatArray) -> FloatArray:
     """Variable projection (Golub and Pereyra, 1973): search over the β alone, the α follow linearly.
 
-    The β of a coarse grid that spans e^±6 over the temperatures start the search; the best few are refined.
+    A fine grid of β that spans e^±6 over the temperatures starts the search, at all valleys of its profile.
     """
     span = max(float(np.ptp(t)), 1.0)
     middle = 0.5 * (float(np.max(t)) + float(np.min(t)))
@@ -223,18 +223,34 @@ def _fit_exponentials(terms: int, t: FloatArray, y: FloatArray, sigma: FloatArra
     def misfit(rates: FloatArray) -> FloatArray:
         return amplitudes(rates)[1]
 
-    grid = np.linspace(-6.0, 6.0, 25)
-    if terms == 1:
-        starts = [np.array([rate]) for rate in grid]
-    else:
-        starts = [np.array([a, b]) for i, a in enumerate(grid) for b in grid[i + 1 :]]
-    starts.sort(key=lambda rates: float(np.sum(misfit(rates) ** 2)))
-    best = starts[0]
-    best_cost = float("inf")
-    for start in starts[:6]:
+    best, best_cost = np.zeros(terms), float("inf")
+    for start in _starting_rates(terms, s, y / sigma, sigma):
         found = least_squares(misfit, start, bounds=(-20.0, 20.0), xtol=1e-12, ftol=1e-14, gtol=1e-14)
         if found.cost < best_cost:
             best, best_cost = np.sort(found.x), float(found.cost)
     alpha, _ = amplitudes(best)
     beta = best / span
     return np.asarray(np.stack([alpha * np.exp(-beta * middle), beta], axis=1).reshape(-1))
+
+
+def _starting_rates(terms: int, s: FloatArray, y: FloatArray, sigma: FloatArray) -> list[FloatArray]:
+    """Rates (terms,) worth starting from: per rate of a grid its best partner, where that profile has a valley."""
+    grid = np.linspace(-6.0, 6.0, 241)
+    columns = np.exp(grid[:, None] * s) / sigma
+    columns /= np.linalg.norm(columns, axis=1, keepdims=True)
+    along = columns @ y
+    if terms == 1:
+        explained, partner = along**2, np.arange(grid.size)
+    else:
+        overlap = columns @ columns.T
+        apart = 1.0 - overlap**2
+        both = along[:, None] ** 2 + along[None, :] ** 2 - 2.0 * overlap * along[:, None] * along[None, :]
+        # Neighbours on the grid are so alike that their difference is rounding.
+        pairs = np.where(apart > 1e-6, both / np.maximum(apart, 1e-6), -np.inf)
+        partner = np.argmax(pairs, axis=1)
+        explained = pairs[np.arange(grid.size), partner]
+    padded = np.concatenate([[-np.inf], explained, [-np.inf]])
+    valleys = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))
+    deepest = valleys[np.argsort(-explained[valleys])][:8]
+    chosen = dict.fromkeys([*deepest.tolist(), *np.argsort(-explained)[:2].tolist()])
+    return [grid[[k]] if terms == 1 else grid[[k, partner[k]]] for k in chosen]

@@ -61,16 +61,23 @@ def points_table(result: IdentifyResult) -> Table:
             text = f"{number(estimate.value)} ± {number(estimate.stderr, 2)}"
             cells.append(text if estimate.identifiable else f"({text})")
         table.add_row(Text(point.label), *cells, number(point.cost_per_sample))
-    reasons = {
-        f"{name} at {point.label}: {estimate.reason}"
-        for point in result.points
-        for name, estimate in point.parameters.items()
-        if not estimate.identifiable
-    }
+    reasons = [reason for name in names if (reason := _why_not(result, name))]
     if reasons:
-        table.caption = "In brackets: not determined by these data.\n" + "\n".join(sorted(reasons))
+        table.caption = "In brackets: not determined by these data.\n" + "\n".join(reasons)
         table.caption_justify = "left"
     return table
+
+
+def _why_not(result: IdentifyResult, name: str) -> str:
+    """Why ``name`` is not determined, for one point or for several at once; empty if it is."""
+    unsure = [
+        (p.label, p.parameters[name].reason) for p in result.points if not p.parameters[name].identifiable
+    ]
+    if not unsure:
+        return ""
+    label, reason = unsure[0]
+    where = label if len(unsure) == 1 else f"{len(unsure)} of {len(result.points)} points, as {label}"
+    return f"{name} at {where}: {reason}"
 
 
 def errors_table(result: IdentifyResult) -> Table:

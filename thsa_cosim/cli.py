@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TypedDict
 import click
 
 from thsa_cosim import __version__
-from thsa_cosim.errors import InputError, ThsaCosimError
+from thsa_cosim.errors import InputError, StudyError, ThsaCosimError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -212,6 +212,51 @@ def _stages(staged: "StagedScenario", options: _RunOptions) -> _Finished:
     result = run_stages(staged, **options)
     files = write_staged(result, options["folder"])
     return files, result.status, result.parameter_set, lambda console: print_staged(console, result)
+
+
+@cli.command()
+@click.argument("scenario", type=PATH)
+@_study_options
+def tune(
+    scenario: Path,
+    fit: tuple[Path, ...],
+    validate: tuple[Path, ...],
+    output: Path | None,
+    seed: int | None,
+    fmu: Path | None,
+    workers: int | None,
+    cluster: str | None,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Tune gains for the commands and conditions that SCENARIO describes; schedule them if it asks."""
+    from thsa_cosim.report.progress import ProgressDisplay
+    from thsa_cosim.report.study import RESULT
+    from thsa_cosim.report.tune_study import print_tune, write_tune
+    from thsa_cosim.scenario import load_tune
+    from thsa_cosim.tune import tune as run
+
+    if fit or validate:
+        raise InputError(
+            f"{scenario}: a tuning describes its command itself; leave out --fit and --validate."
+        )
+    loaded = load_tune(scenario, seed=seed, fmu=fmu)
+    folder = output or default_folder(scenario)
+    with ProgressDisplay(_console(stderr=True), quiet=quiet) as display:
+        result = run(loaded, folder=folder, workers=workers or cores(), cluster=cluster, on_progress=display)
+        files = write_tune(result, folder)
+    if result.status == "interrupted":
+        raise _Interrupted(_continue_command("tune", scenario, folder))
+    if as_json:
+        click.echo((folder / RESULT).read_text(encoding="utf-8"), nl=False)
+    elif not quiet:
+        console = _console()
+        print_tune(console, result)
+        console.print(
+            f"\n{len(files)} files in {folder}; the numbers are in {folder / RESULT}", soft_wrap=True
+        )
+    if result.after is None or not result.after.feasible:
+        raise StudyError(f"{scenario}: no gains within the bounds keep every hard requirement.")
 
 
 @cli.command()

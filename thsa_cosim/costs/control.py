@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thsa_cosim.costs.metrics import first_reach, overshoot, steady_state_error
+from thsa_cosim.costs.metrics import first_reach, overshoot, rise_time, steady_state_error
 
 FloatArray = NDArray[np.float64]
 
@@ -30,20 +30,26 @@ def control_cost(
     kappa_steady: float,
     window: tuple[float, float],
     fraction: float = 0.95,
+    low: float | None = None,
     start: float | None = None,
     scale: float = 1.0,
+    signed: bool = False,
 ) -> ControlCost:
     """Equation 7 for ``response`` to ``command``, both (n,) in one unit, over ``time`` (n,) in s.
 
     ``scale`` divides the velocity error (the article works in mm/s: 1e-3 for signals in m/s), κ1 and κ2
-    weigh the rise time in s and |e_ss|; e_ss enters by its size, for its sign carries no merit. The rise
-    time is the first reach of ``fraction`` of the command's last value, counted from ``start``.
+    weigh the rise time in s and |e_ss|; e_ss enters by its size, for its sign carries no merit (``signed``
+    takes it as the article prints it, which rewards running too fast). The rise time is the first reach of
+    ``fraction`` of the command's last value, counted from ``start``, or from the first reach of ``low``.
     """
     final = float(command[-1])
     tracking = float(np.sum(0.5 * ((command - response) / scale) ** 2))
-    rise = first_reach(time, response, final, fraction, start=start)
+    if low is None:
+        rise = first_reach(time, response, final, fraction, start=start)
+    else:
+        rise = rise_time(time, response, final, low=low, high=fraction, start=start)
     steady = steady_state_error(time, response, command, window)
-    total = tracking + kappa_rise * rise + kappa_steady * abs(steady)
+    total = tracking + kappa_rise * rise + kappa_steady * (steady if signed else abs(steady))
     return ControlCost(
         total=total if np.isfinite(total) else float("inf"),
         tracking=tracking,

@@ -87,7 +87,7 @@ def c_header(schedule: GainSchedule, title: str) -> str:
     lines += [
         "",
         "/* Interval below x and the share of it, within the table. */",
-        "static int gain_schedule_find(const double *nodes, int count, double x, double *share) {",
+        "static inline int gain_schedule_find(const double *nodes, int count, double x, double *share) {",
         "    int k = 0;",
         "    if (!(x > nodes[0])) { *share = 0.0; return 0; }",
         "    if (x >= nodes[count - 1]) { *share = 1.0; return count - 2; }",

@@ -118,7 +118,7 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         ),
         cost=_cost(table, command, fmu),
         requirements=requirements,
-        loop=_loop(table, command, fmu),
+        loop=_loop(table, command, fmu, space),
         combine=table.robust.combine,
         uncertainty=read_uncertainty(path, table, axes, fmu),
         schedule=_schedule(table, axes, fmu),
@@ -260,7 +260,9 @@ def _cost(table: TuneTable, command: CommandSpec, fmu: FmuDescription) -> Contro
     )
 
 
-def _loop(table: TuneTable, command: CommandSpec, fmu: FmuDescription) -> LoopSpec | None:
+def _loop(
+    table: TuneTable, command: CommandSpec, fmu: FmuDescription, space: ParameterSpace
+) -> LoopSpec | None:
     if table.loop is None:
         return None
     check.readable(fmu, table.loop.signal, "loop.signal")
@@ -274,7 +276,11 @@ def _loop(table: TuneTable, command: CommandSpec, fmu: FmuDescription) -> LoopSp
         )
     if table.simulation.reuse == "reset":
         raise ScenarioError("[loop] needs simulation.reuse = 'fresh': only one instance may live at a time.")
-    return LoopSpec(table.loop.signal, at)
+    names = table.loop.gains or list(space.names)
+    for name in names:
+        if name not in space.names:
+            raise ScenarioError(f"loop.gains: {name!r} is no parameter.{did_you_mean(name, space.names)}")
+    return LoopSpec(table.loop.signal, at, tuple(space[name].variable for name in names))
 
 
 def _schedule(table: TuneTable, axes: Sequence[Axis], fmu: FmuDescription) -> ScheduleSpec | None:

@@ -131,10 +131,14 @@ class Requirement:
 
 @dataclass(frozen=True)
 class LoopSpec:
-    """The loop is opened at ``signal``; linearised with the response's state at ``at`` [s]."""
+    """The loop is opened at ``signal``; linearised with the response's state at ``at`` [s].
+
+    ``gains`` are FMU parameters that act on the plant through that signal alone.
+    """
 
     signal: str
     at: float
+    gains: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)

@@ -161,6 +161,7 @@ class LoopTable(Table):
 
     signal: Name
     at: NotNegative | None = None
+    gains: list[Name] | None = Field(default=None, min_length=1)
 
 
 class RobustTable(Table):

@@ -1,0 +1,41 @@
+"""Tuning: a command and the conditions it must serve under → gains, and a schedule of them.
+
+``run``         the use case as a function
+``problem``     scenario → experiments, and the groups of conditions that share gains
+``response``    what a worker makes of one response: its terms
+``margins``     gain margin, phase margin and bandwidth of the opened loop
+``combine``     terms over conditions → one cost, with hard and soft requirements
+``samples``     parameter samples from an identification's covariance
+``evaluate``    vectors → simulations → costs, with the journal
+``population``  the population's path, and the line it draws towards
+``pareto``      non-dominated gains
+``schedule``    gains over conditions: smoothing and interpolation
+``study``       identity of a study, and its runner
+``results``     what comes out
+"""
+
+from thsa_cosim.tune.results import (
+    GroupResult,
+    Pareto,
+    ScheduleCheck,
+    ScheduleResult,
+    Scored,
+    Surface,
+    TuneResult,
+)
+from thsa_cosim.tune.run import tune
+from thsa_cosim.tune.schedule import GainSchedule
+from thsa_cosim.tune.study import study_identity
+
+__all__ = [
+    "GainSchedule",
+    "GroupResult",
+    "Pareto",
+    "ScheduleCheck",
+    "ScheduleResult",
+    "Scored",
+    "Surface",
+    "TuneResult",
+    "study_identity",
+    "tune",
+]

@@ -1,0 +1,182 @@
+"""What a worker makes of one response: its terms, margins among them, as one array."""
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from thsa_cosim.costs import control_cost, settling_time
+from thsa_cosim.fmu import FmuDescription, SimulationFailure
+from thsa_cosim.fmu.archive import unpack
+from thsa_cosim.fmu.linear import open_loop, state_names
+from thsa_cosim.scenario import TuneScenario
+from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.tune.margins import Margins, margins
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Names and positions of a response's terms, in the order of the reducer's array."""
+
+    names: tuple[str, ...]
+    peaks: tuple[str, ...]
+    effort: str | None
+    with_loop: bool
+
+    @classmethod
+    def of(cls, scenario: TuneScenario) -> "Terms":
+        """The terms that a scenario asks for."""
+        peaks = tuple(dict.fromkeys(r.signal for r in scenario.requirements if r.signal))
+        names = [
+            "tracking",
+            "rise_time",
+            "steady_state_error",
+            "overshoot",
+            "settling_time",
+            "tracking_error",
+        ]
+        names += ["effort"] if scenario.metrics.effort else []
+        names += [f"peak.{signal}" for signal in peaks]
+        names += ["gain_margin", "phase_margin", "bandwidth"] if scenario.loop else []
+        return cls(tuple(names), peaks, scenario.metrics.effort, scenario.loop is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class LoopTask:
+    """What linearising needs; ``fixed`` and ``inputs`` as in the simulation, ``tuned`` is recorded with it."""
+
+    fmu: FmuDescription
+    fixed: Mapping[str, float]
+    inputs: Mapping[str, float]
+    command: str
+    tuned: tuple[str, ...]
+    gains: tuple[str, ...]
+    signal: str
+    at: float
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Variables that the simulation must record for it: states and tuned parameters."""
+        return (*state_names(self.fmu), *self.tuned)
+
+    def __call__(self, signals: Signals, command: FloatArray) -> Margins:
+        """Margins at the state of ``signals`` at ``at``; NaN where the FMU refuses."""
+        k = int(np.argmin(np.abs(signals.time - self.at)))
+        tuned = {name: float(signals[name][k]) for name in self.tuned}
+        try:
+            loop = open_loop(
+                self.fmu,
+                _unpacked(self.fmu),
+                values={**self.fixed, **tuned},
+                inputs={**self.inputs, self.command: float(command[k])},
+                time=float(signals.time[k]),
+                states=np.array([signals[name][k] for name in state_names(self.fmu)]),
+                signal=self.signal,
+                gains=self.gains,
+            )
+        except SimulationFailure:
+            return Margins(np.nan, np.nan, np.nan)
+        return margins(loop)
+
+
+_FOLDERS: dict[str, Path] = {}
+
+
+def _unpacked(fmu: FmuDescription) -> Path:
+    """Folder of the FMU in this process: beside a worker's scratch folder, which goes with the study."""
+    if fmu.sha256 not in _FOLDERS:
+        here = Path.cwd()
+        parent = here.parent if here.name == "cwd" else None
+        folder = Path(tempfile.mkdtemp(prefix="linear-", dir=parent))
+        unpack(fmu.path, folder)
+        _FOLDERS[fmu.sha256] = folder
+    return _FOLDERS[fmu.sha256]
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseReducer:
+    """Signals of one run → its terms (q,), as :class:`Terms` names them; picklable."""
+
+    terms: Terms
+    output: str
+    command: FloatArray
+    begin: float
+    factor: float
+    scale: float
+    fraction: float
+    low: float | None
+    window: tuple[float, float]
+    settling_band: float
+    loop: LoopTask | None
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Variables that the simulation must record."""
+        own = (self.output, *((self.terms.effort,) if self.terms.effort else ()), *self.terms.peaks)
+        return tuple(dict.fromkeys((*own, *(self.loop.recorded if self.loop else ()))))
+
+    def __call__(self, signals: Signals) -> FloatArray:
+        """Return the terms; velocity errors in units of the cost, times in s, e_ss and overshoot as shares."""
+        time, response = signals.time, signals[self.output] * self.factor
+        cost = control_cost(
+            time,
+            response,
+            self.command,
+            kappa_rise=0.0,
+            kappa_steady=0.0,
+            window=self.window,
+            fraction=self.fraction,
+            low=self.low,
+            start=self.begin,
+            scale=self.scale,
+        )
+        final = float(self.command[-1])
+        found = [
+            cost.tracking,
+            cost.rise_time,
+            cost.steady_state_error,
+            cost.overshoot,
+            settling_time(time, response, final, self.settling_band, start=self.begin),
+            float(np.max(np.abs(self.command - response))) / self.scale,
+        ]
+        if self.terms.effort is not None:
+            found.append(float(np.sqrt(np.mean(signals[self.terms.effort] ** 2))))
+        found += [float(np.max(np.abs(signals[name]))) for name in self.terms.peaks]
+        if self.loop is not None:
+            m = self.loop(signals, self.command)
+            found += [m.gain_margin, m.phase_margin, m.bandwidth]
+        return np.array(found)
+
+
+def reducer(
+    scenario: TuneScenario, inputs: Mapping[str, float], fixed: Mapping[str, float]
+) -> ResponseReducer:
+    """The reducer of one condition: its constant ``inputs`` and ``fixed`` start values, in the FMU's units."""
+    command, metrics = scenario.command, scenario.metrics
+    loop = scenario.loop
+    return ResponseReducer(
+        terms=Terms.of(scenario),
+        output=command.output,
+        command=command.values,
+        begin=command.begin,
+        factor=command.factor,
+        scale=scenario.cost.scale,
+        fraction=metrics.high if metrics.rise == "between" else metrics.fraction,
+        low=metrics.low if metrics.rise == "between" else None,
+        window=metrics.window,
+        settling_band=metrics.settling_band,
+        loop=None
+        if loop is None
+        else LoopTask(
+            scenario.fmu,
+            fixed,
+            inputs,
+            command.input,
+            tuple(p.variable for p in scenario.parameters.parameters),
+            loop.gains,
+            loop.signal,
+            loop.at,
+        ),
+    )

@@ -1,0 +1,326 @@
+"""The use case: scenario → one search per group of conditions over one runner → gains, schedule, result."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from thsa_cosim import __version__
+from thsa_cosim.batch import Journal
+from thsa_cosim.errors import StudyError
+from thsa_cosim.identify import Progress, open_study
+from thsa_cosim.identify.interleave import interleave
+from thsa_cosim.scenario import TuneScenario
+from thsa_cosim.scenario.tune_model import combinations
+from thsa_cosim.search import EvolutionResult, EvolutionSettings, Generation, evolve
+from thsa_cosim.signals import FloatArray
+from thsa_cosim.tune.combine import INFEASIBLE, equation_7
+from thsa_cosim.tune.evaluate import Evaluation, Evaluator, Reply, Request, cases_of
+from thsa_cosim.tune.pareto import front
+from thsa_cosim.tune.population import Line, PopulationPath, line_of
+from thsa_cosim.tune.problem import ALL, Case, Group, build_cases, build_groups
+from thsa_cosim.tune.response import Terms
+from thsa_cosim.tune.results import (
+    GroupResult,
+    Pareto,
+    ScheduleCheck,
+    ScheduleResult,
+    Scored,
+    Surface,
+    TuneResult,
+)
+from thsa_cosim.tune.schedule import GainSchedule, smooth
+from thsa_cosim.tune.study import open_runner, study_identity
+
+JOURNAL = "journal.csv"
+#: The smoothing is divided by 4 until no node breaks a hard requirement, so often at most.
+WEAKER = 6
+
+Ask = Callable[[Request], Reply]
+
+
+def tune(
+    scenario: TuneScenario,
+    *,
+    folder: Path,
+    workers: int = 1,
+    cluster: str | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> TuneResult:
+    """Tune the scenario's parameters in the study folder ``folder``; continue what it holds.
+
+    A KeyboardInterrupt ends the study early: the result then has the status "interrupted". The same call
+    continues it, and ends with what an undisturbed run would have found.
+
+    Raises
+    ------
+    InputError
+        If the folder holds a different study.
+    StudyError
+        If no simulation gave a usable response.
+    """
+    groups = build_groups(scenario)
+    checked: Sequence[Case] = ()
+    if scenario.schedule is not None:
+        checked = build_cases(scenario, combinations(scenario.schedule.check), sampled=False)
+    open_study(folder, study_identity(scenario))
+    names = Terms.of(scenario).names
+    study = _Study(scenario, groups, Group("check", {}, tuple(checked)), names)
+    with Journal.open(folder / JOURNAL, scenario.parameters.names, names) as journal:
+        try:
+            experiments = [case.experiment for case in cases_of([*groups, study.check])]
+            with open_runner(scenario, experiments, workers, cluster) as runner:
+                evaluator = Evaluator(scenario, runner, journal, groups, names, on_progress)
+                study.run(evaluator, journal)
+        except KeyboardInterrupt:
+            study.interrupted = True
+    return study.result()
+
+
+@dataclass(eq=False)
+class _Study:
+    """What has been found so far."""
+
+    scenario: TuneScenario
+    groups: Sequence[Group]
+    check: Group
+    names: tuple[str, ...]
+    interrupted: bool = False
+    found: dict[int, EvolutionResult] = field(default_factory=dict)
+    paths: dict[int, PopulationPath] = field(default_factory=dict)
+    scored: list[Scored] = field(default_factory=list)
+    surface: Surface | None = None
+    pareto: Pareto | None = None
+    schedule: ScheduleResult | None = None
+    notes: list[str] = field(default_factory=list)
+    evaluator: Evaluator | None = None
+
+    def run(self, evaluator: Evaluator, journal: Journal) -> None:
+        """Search all groups at once, then score, draw and schedule."""
+        self.evaluator = evaluator
+        self._search(evaluator)
+        spec = self.scenario
+        sets = {"before": spec.before, "after": self._gains(0), **spec.compare}
+        found = evaluator.evaluate(self.groups[0], [dict(v) for v in sets.values()], keep_signals=True)
+        self.scored = [self._score(name, f) for name, f in zip(sets, found, strict=True)]
+        if spec.surface is not None:
+            self.surface = self._surface(evaluator)
+        if spec.pareto is not None:
+            self.pareto = self._pareto(journal)
+        if spec.schedule is not None:
+            self.schedule = self._schedule(evaluator)
+
+    # -- search ---------------------------------------------------------------------------------------
+    def _search(self, evaluator: Evaluator) -> None:
+        spec = self.scenario.search
+        settings = EvolutionSettings(
+            population=spec.population,
+            generations=spec.generations,
+            mutation=spec.mutation,
+            crossover=spec.crossover,
+            strategy=spec.strategy,
+            seed=self.scenario.seed,
+            tolerance=spec.tolerance,
+        )
+        planned = settings.population * (settings.generations + 1)
+        for k in range(len(self.groups)):
+            evaluator.plan(k, planned)
+
+        def task(index: int) -> Callable[[Ask], EvolutionResult]:
+            return lambda ask: self._evolve(index, settings, evaluator, ask)
+
+        tasks = [task(k) for k in range(len(self.groups))]
+        with closing(interleave(tasks, evaluator.serve)) as finished:
+            for index, result in finished:
+                self.found[index] = result
+                evaluator.plan(index, result.evaluations - planned)
+
+    def _evolve(
+        self, index: int, settings: EvolutionSettings, evaluator: Evaluator, ask: Ask
+    ) -> EvolutionResult:
+        space = self.scenario.parameters
+        path = self.paths[index] = PopulationPath()
+
+        def costs(vectors: FloatArray) -> FloatArray:
+            values = space.physical(vectors)
+            reply = ask(Request(values))
+            if not path.populations and not np.isfinite(reply.costs).any():
+                reason = next((r for r in reply.reasons if r), "no response reaches its command")
+                raise StudyError(
+                    f"{self.scenario.path}: none of the first {len(values)} sets of gains"
+                    f" ({self.groups[index].label}) gave a usable response: {reason}."
+                )
+            path.add(values, reply.costs)
+            return reply.costs
+
+        start = space.start() if any(p.start is not None for p in space.parameters) else None
+
+        def on_generation(generation: Generation) -> None:
+            evaluator.note_generation(generation.index)
+
+        return evolve(costs, space.dimension, settings, start=start, on_generation=on_generation)
+
+    def _gains(self, index: int) -> dict[str, float]:
+        return self.scenario.parameters.decode(self.found[index].best)
+
+    # -- what follows ---------------------------------------------------------------------------------
+    def _score(self, name: str, found: Evaluation) -> Scored:
+        if found.reason:
+            self.notes.append(f"{name} could not be simulated everywhere: {found.reason}.")
+        combined = found.combined
+        return Scored(
+            name=name,
+            gains=found.values,
+            cost=combined.cost,
+            eq7=combined.eq7,
+            worst=dict(zip(self.names, combined.worst.tolist(), strict=True)),
+            terms=found.terms,
+            excess={
+                r.name: x for r, x in zip(self.scenario.requirements, combined.excess.tolist(), strict=True)
+            },
+            feasible=combined.feasible,
+            signals=found.signals,
+        )
+
+    def _surface(self, evaluator: Evaluator) -> Surface:
+        spec, space = self.scenario.surface, self.scenario.parameters
+        assert spec is not None
+        best = self.found[0].best
+        i, j = (space.names.index(name) for name in spec.parameters)
+        unit = np.linspace(0.0, 1.0, spec.points)
+        vectors = np.repeat(best[None, :], spec.points**2, axis=0)
+        vectors[:, i] = np.tile(unit, spec.points)
+        vectors[:, j] = np.repeat(unit, spec.points)
+        values = space.physical(vectors)
+        evaluator.plan(0, len(values))
+        reply = evaluator.serve([(0, Request(values))])[0]
+        shape = (spec.points, spec.points)
+        eq7 = self._eq7_of_worst(reply.worst)
+        feasible = reply.costs < INFEASIBLE
+        return Surface(
+            names=spec.parameters,
+            x=values[: spec.points, i],
+            y=values[:: spec.points, j],
+            cost=np.where(feasible, reply.costs, np.nan).reshape(shape),
+            eq7=eq7.reshape(shape),
+            populations=tuple(p[:, [i, j]] for p in self.paths[0].populations),
+        )
+
+    def _eq7_of_worst(self, worst: FloatArray) -> FloatArray:
+        """Equation 7 of the worst terms (m, q): the cost itself where there is one condition."""
+        return equation_7(self.scenario, self.names, worst)
+
+    def _pareto(self, journal: Journal) -> Pareto:
+        spec = self.scenario.pareto
+        assert spec is not None
+        i, j = self.names.index(spec.x), self.names.index(spec.y)
+        rows = [row for row in journal.rows if row.stage == ALL and row.cost < INFEASIBLE]
+        x, y = np.array([r.terms[i] for r in rows]), np.array([r.terms[j] for r in rows])
+        chosen = front(x, y)
+        values = np.array([rows[k].values for k in chosen]).reshape(
+            len(chosen), len(self.scenario.parameters)
+        )
+        return Pareto(spec.x, spec.y, x[chosen], y[chosen], values, x, y)
+
+    # -- schedule -------------------------------------------------------------------------------------
+    def _schedule(self, evaluator: Evaluator) -> ScheduleResult:
+        spec, space = self.scenario.schedule, self.scenario.parameters
+        assert spec is not None
+        axes = [axis for axis in self.scenario.axes if axis.name in spec.over]
+        nodes = tuple(np.array(axis.values) for axis in axes)
+        shape = tuple(n.size for n in nodes)
+        best = np.stack([self.found[k].best for k in range(1, len(self.groups))])
+
+        def schedule(vectors: FloatArray) -> GainSchedule:
+            values = space.physical(np.clip(vectors, 0.0, 1.0))
+            return GainSchedule(
+                names=tuple(axis.name for axis in axes),
+                units=tuple(axis.unit for axis in axes),
+                nodes=nodes,
+                gains={name: values[:, k].reshape(shape) for k, name in enumerate(space.names)},
+                gain_units={p.name: p.unit for p in space.parameters},
+            )
+
+        strength, allowed = spec.smoothing, self._broken(evaluator, best)
+        for _ in range(WEAKER):
+            columns = [
+                smooth(best[:, k].reshape(shape), nodes, strength).ravel() for k in range(space.dimension)
+            ]
+            drawn = np.stack(columns, axis=1)
+            if strength == 0.0 or self._broken(evaluator, drawn) <= allowed + 1e-12:
+                break
+            strength /= 4.0
+        else:
+            strength, drawn = 0.0, best
+            self.notes.append("The schedule was not smoothed: every smoothing broke a hard requirement.")
+        if 0.0 < strength < spec.smoothing:
+            self.notes.append(f"The smoothing was lowered to {strength:g} to keep the hard requirements.")
+        final = schedule(drawn)
+        return ScheduleResult(final, schedule(best), strength, self._check(evaluator, final))
+
+    def _broken(self, evaluator: Evaluator, vectors: FloatArray) -> float:
+        """By how much the nodes' gains (k, n) in the unit cube break hard requirements, summed."""
+        space = self.scenario.parameters
+        requests = [
+            (k + 1, Request(space.physical(np.clip(v, 0.0, 1.0))[None, :])) for k, v in enumerate(vectors)
+        ]
+        costs = np.array([float(reply.costs[0]) for reply in evaluator.serve(requests)])
+        return float(
+            np.sum(np.maximum(costs / INFEASIBLE, 1.0) - 1.0) + np.count_nonzero(costs >= INFEASIBLE)
+        )
+
+    def _check(self, evaluator: Evaluator, schedule: GainSchedule) -> ScheduleCheck:
+        spec = self.scenario
+        conditions = tuple(case.condition.shown for case in self.check.cases)
+        constant = {"best single set": self._gains(0), **spec.compare, "before": spec.before}
+        sets = [[schedule.at(c) for c in conditions]]
+        sets += [[dict(values)] * len(conditions) for values in constant.values()]
+        found = evaluator.evaluate_each(self.check, sets)
+        scored = [self._score(name, f) for name, f in zip(["schedule", *constant], found, strict=True)]
+        return ScheduleCheck(conditions, tuple(scored))
+
+    # -- result ---------------------------------------------------------------------------------------
+    def result(self) -> TuneResult:
+        """Everything found so far."""
+        scenario, evaluator = self.scenario, self.evaluator
+        by_name = {s.name: s for s in self.scored}
+        after = by_name.get("after")
+        if after is not None and not after.feasible:
+            broken = ", ".join(name for name, x in after.excess.items() if x > 0.0)
+            self.notes.append(f"No gains within the bounds keep every hard requirement; broken: {broken}.")
+        return TuneResult(
+            scenario=scenario,
+            status="interrupted" if self.interrupted else "complete",
+            version=__version__,
+            fmu=scenario.fmu.path,
+            groups=tuple(self._group(k) for k in sorted(self.found)),
+            terms=self.names,
+            conditions=tuple(c.condition.shown for c in self.groups[0].cases),
+            before=by_name.get("before"),
+            after=after,
+            compare=tuple(s for s in self.scored if s.name in scenario.compare),
+            line=self._line(),
+            surface=self.surface,
+            pareto=self.pareto,
+            schedule=self.schedule,
+            evaluations=0 if evaluator is None else evaluator.evaluations,
+            failures={} if evaluator is None else evaluator.failures,
+            notes=tuple(self.notes),
+            settings={**asdict(scenario.search), "cost": asdict(scenario.cost), "combine": scenario.combine},
+        )
+
+    def _group(self, k: int) -> GroupResult:
+        found, group = self.found[k], self.groups[k]
+        gains: Mapping[str, float] = self._gains(k)
+        return GroupResult(
+            group.label, group.at, gains, found.cost, found.cost < INFEASIBLE, found.history, found.reason
+        )
+
+    def _line(self) -> Line | None:
+        spec, names = self.scenario.line, self.scenario.parameters.names
+        if spec is None or 0 not in self.found:
+            return None
+        columns = [(name, names.index(name)) for name in (spec.numerator, spec.denominator)]
+        return line_of(self.paths[0], columns[0], columns[1], spec.generations, spec.published)

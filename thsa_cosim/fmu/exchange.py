@@ -7,6 +7,7 @@ event indicators are compared after every step as well (an indicator that return
 root); time and step events follow FMI 2.0.4 clause 3.2 and FMI 3.0.2 clause 3.2.
 """
 
+import ctypes
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -85,28 +86,53 @@ class _Run:
         self.next_row = 0
         self.next_event: float | None = None
         self.ends = False
-        prefix = {"fmi2": "GetDerivatives", "fmi3": "GetContinuousStateDerivatives"}
-        self._derivatives = prefix[instance.prefix]
+        self._derivatives = "GetDerivatives" if instance.prefix == "fmi2" else "GetContinuousStateDerivatives"
+        # The right-hand side is called some thousand times per second: functions and buffers are bound once.
+        pointer, function, prefix = ctypes.c_void_p, instance.library.function, instance.prefix
+        self._x, self._dx, self._z = np.zeros(self.nx), np.zeros(self.nx), np.zeros(self.nz)
+        self._x_address, self._dx_address = self._x.ctypes.data, self._dx.ctypes.data
+        self._set_time = function(f"{prefix}SetTime", pointer, ctypes.c_double)
+        self._set_states = function(f"{prefix}SetContinuousStates", pointer, pointer, ctypes.c_size_t)
+        self._get_derivatives = function(f"{prefix}{self._derivatives}", pointer, pointer, ctypes.c_size_t)
+        self._continuous = [
+            (
+                channel,
+                np.zeros(len(channel.references), dtype=channel.dtype),
+                list(channel.columns),
+                instance.value_function("Set", channel.suffix),
+            )
+            for channel in plan.input_channels
+            if channel.dtype.kind == "f"
+        ]
+        """Outside of Event Mode only continuous inputs may change."""
 
     # -- the FMU at one point -------------------------------------------------------------------------
     def place(self, time: float, states: FloatArray) -> None:
         """Give the FMU a time, states and the inputs there."""
-        instance = self.instance
+        check, handle = self.instance.check, self.instance.handle
         self.progress[1] = time
-        instance.set_time(time)
+        if code := self._set_time(handle, time):
+            check(code, "SetTime", time)
         if self.nx:
-            instance.vector("SetContinuousStates", np.ascontiguousarray(states[: self.nx]))
-        if self.plan.input_channels:
-            self.apply_inputs(time, only_linear=True)
+            self._x[:] = states
+            if code := self._set_states(handle, self._x_address, self.nx):
+                check(code, "SetContinuousStates", time)
+        if self._continuous:
+            segment = self.segment
+            values = segment.value + segment.slope * (time - segment.start)
+            for channel, buffer, columns, setter in self._continuous:
+                buffer[:] = values[columns]
+                code = self.instance.access(
+                    setter, channel.references.ctypes.data, len(buffer), buffer.ctypes.data
+                )
+                if code:
+                    check(code, f"Set{channel.suffix}", time)
 
-    def apply_inputs(self, time: float, *, only_linear: bool) -> None:
-        """Set u(time); outside of Event Mode only continuous inputs may change."""
+    def apply_inputs(self, time: float) -> None:
+        """Set all inputs to u(time), in Event Mode or before."""
         segment = self.segment
         values = segment.value + segment.slope * (time - segment.start)
-        channels = self.plan.input_channels
-        if only_linear:
-            channels = [c for c in channels if c.dtype.kind == "f"]
-        self.instance.set_values(channels, values)
+        self.instance.set_values(self.plan.input_channels, values)
 
     def rhs(self, time: float, states: FloatArray, out: FloatArray) -> None:
         """dx/dt for CVODE."""
@@ -114,8 +140,10 @@ class _Run:
         if not self.nx:
             out[:] = 0.0
             return
-        self.instance.vector(self._derivatives, out)
-        if not np.isfinite(out).all():
+        if code := self._get_derivatives(self.instance.handle, self._dx_address, self.nx):
+            self.instance.check(code, self._derivatives, time)
+        out[:] = self._dx
+        if not np.isfinite(self._dx).all():
             i = int(np.argmin(np.isfinite(out)))
             reason = f"the derivative of state {i + 1} became {out[i]} at t = {time:.9g} s"
             raise SimulationFailure(Status.NOT_FINITE, reason)
@@ -123,14 +151,14 @@ class _Run:
     def roots(self, time: float, states: FloatArray, out: FloatArray) -> None:
         """Event indicators for CVODE."""
         self.place(time, states)
-        self.instance.vector("GetEventIndicators", out)
+        self.instance.vector("GetEventIndicators", self._z)
+        out[:] = self._z
 
     def signs(self) -> FloatArray:
         """Signs of the event indicators at the present point."""
-        z = np.zeros(self.nz)
         if self.nz:
-            self.instance.vector("GetEventIndicators", z)
-        return np.asarray(z > 0.0, dtype=np.float64)
+            self.instance.vector("GetEventIndicators", self._z)
+        return np.asarray(self._z > 0.0, dtype=np.float64)
 
     def record(self, time: float, states: FloatArray) -> None:
         """Read the outputs as the next row."""
@@ -175,7 +203,7 @@ class _Run:
         """Handle an event at the present point and restart the solver."""
         self.instance.enter_event_mode()
         if self.plan.input_channels:
-            self.apply_inputs(time, only_linear=False)
+            self.apply_inputs(time)
         self.iterate_events()
         solver.restart(time, self.states(), self.absolute_tolerance())
 
@@ -188,7 +216,7 @@ class _Run:
         instance, t1, t = self.instance, float(times[-1]), float(times[0])
         instance.initialize_begin(t, t1, self.rtol)
         if self.plan.input_channels:
-            self.apply_inputs(t, only_linear=False)
+            self.apply_inputs(t)
         instance.initialize_end()
         self.iterate_events()
         self.progress[0] = Phase.STEP

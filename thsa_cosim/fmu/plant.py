@@ -1,6 +1,7 @@
 """An opened FMU that can be run again and again."""
 
 import importlib
+import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -26,6 +27,7 @@ Backend = Literal["compiled", "python"]
 Reuse = Literal["fresh", "reset"]
 
 _PLANS = 64
+_log = logging.getLogger(__name__)
 
 
 class Plant:
@@ -283,6 +285,7 @@ class Plant:
 def _default_backend() -> Backend:
     try:
         importlib.import_module("thsa_cosim.fmu.compiled")
-    except Exception:  # numba missing or broken: slower, the same numbers
+    except Exception as error:
+        _log.warning("numba cannot be used (%s): the same numbers, but some ten times slower.", error)
         return "python"
     return "compiled"

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import subprocess
 import sys
 import zipfile
 from pathlib import Path
@@ -231,8 +232,6 @@ def test_start_values_can_be_replaced_at_export(tmp_path):
 def test_sources_inside_build_again(built, tmp_path):
     if shutil.which("gcc") is None:
         pytest.skip("no gcc on this machine to build the sources with")
-    import subprocess
-
     with zipfile.ZipFile(built("Pendulum.mo")) as archive:
         archive.extractall(tmp_path)
     sources = sorted(str(path) for path in (tmp_path / "sources").glob("*.c"))
@@ -242,6 +241,57 @@ def test_sources_inside_build_again(built, tmp_path):
         capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+
+
+SHIPPED = sorted(str(path.relative_to(REPO)) for path in (REPO / "fmus").rglob("*.fmu"))
+
+
+@pytest.mark.parametrize("path", SHIPPED)
+def test_shipped_fmus_validate_silently_and_run_in_fmpy(path):
+    def fmpy(*arguments):
+        return subprocess.run(
+            [sys.executable, "-m", "fmpy", *arguments], capture_output=True, text=True, cwd=REPO
+        )
+
+    validated = fmpy("validate", path)
+    assert validated.returncode == 0
+    assert validated.stdout.strip() == "No problems found."
+    for kind in ("CoSimulation", "ModelExchange"):
+        result = simulate_fmu(str(REPO / path), fmi_type=kind, stop_time=0.02)
+        assert all(np.isfinite(result[name]).all() for name in result.dtype.names)
+
+
+def test_shipped_fmus_hold_binaries_for_every_platform():
+    for path in SHIPPED:
+        with zipfile.ZipFile(REPO / path) as archive:
+            found = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
+        if path.startswith("fmus/fmi3"):
+            assert found == {
+                "x86_64-linux",
+                "aarch64-linux",
+                "x86_64-windows",
+                "x86_64-darwin",
+                "aarch64-darwin",
+            }
+        else:
+            assert found == {"linux64", "win64", "darwin64"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", ["fmus/THSA.fmu", "fmus/fmi3/THSA.fmu"])
+def test_fmpy_compiles_the_sources(tmp_path, path):
+    if shutil.which("cmake") is None or shutil.which("gcc") is None:
+        pytest.skip("no cmake and gcc on this machine to compile an FMU with")
+    fmu = tmp_path / "THSA.fmu"
+    shutil.copyfile(REPO / path, fmu)
+    compiled = subprocess.run(
+        [sys.executable, "-m", "fmpy", "compile", str(fmu)], capture_output=True, text=True
+    )
+    assert compiled.returncode == 0, compiled.stderr
+    time = np.linspace(0, 0.1, 11)
+    values = {"v_cmd": 9e-3, "F_load": 55e3}
+    got, shipped = (simulate(source, ["i_q", "v"], time, values=values) for source in (fmu, REPO / path))
+    np.testing.assert_allclose(got["i_q"], shipped["i_q"], rtol=1e-9)
 
 
 def test_shipped_fmus_are_up_to_date():

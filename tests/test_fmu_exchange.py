@@ -113,7 +113,7 @@ def test_termination_by_the_fmu_is_incomplete() -> None:
 
 
 def test_fmi3_events_and_exact_jacobian() -> None:
-    time = np.linspace(0.0, 6.0, 601)
+    time = np.linspace(0.0, 3.0, 301)
     inputs = Signals(time, {"u": 1.0 - np.cos(2.0 * np.pi * time)}, {})
     with Plant.open(build.lag3(), kind="model-exchange") as plant:
         found = plant.run({"tau": 0.01}, inputs, ["y", "count"], time, tolerance=1e-8)

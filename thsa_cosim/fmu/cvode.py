@@ -68,6 +68,7 @@ class Cvode:
         """What the right-hand side last refused, also if the step was then repeated with success."""
         self._error: BaseException | None = None
         self._rhs, self._roots, self._jacobian = rhs, roots, jacobian
+        self._views: dict[int, FloatArray] = {}
         pointer, real = ctypes.c_void_p, ctypes.c_double
         context = sun.SUNContext()
         self._require(sun.SUNContext_Create(sun.SUN_COMM_NULL, ctypes.byref(context)))
@@ -112,10 +113,14 @@ class Cvode:
         return int(function(*arguments))
 
     def _view(self, vector: Any) -> FloatArray:
-        pointer = (
-            vector if isinstance(vector, self._sun.N_Vector) else ctypes.cast(vector, self._sun.N_Vector)
-        )
-        view: FloatArray = np.ctypeslib.as_array(self._sun.NV_DATA_S(pointer), (self._n,))
+        """Return an N_Vector's data (n,) as an array; SUNDIALS keeps a few vectors and passes them around."""
+        if not isinstance(vector, self._sun.N_Vector):
+            vector = ctypes.cast(vector, self._sun.N_Vector)
+        key = ctypes.addressof(vector.contents)
+        view = self._views.get(key)
+        if view is None:
+            view = np.ctypeslib.as_array(self._sun.NV_DATA_S(vector), (self._n,))
+            self._views[key] = view
         return view
 
     @staticmethod

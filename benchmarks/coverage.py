@@ -21,12 +21,12 @@ import pandas as pd
 REPO = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(REPO / "tests"))
 
-from reference.radau import simulate_motor  # noqa: E402
-from reference.rig import LAWS, Widths, rig_at  # noqa: E402
-from reference.waves import Wave  # noqa: E402
+from reference.radau import simulate_motor
+from reference.rig import LAWS, Widths, rig_at
+from reference.waves import Wave
 
-from thsa_cosim.identify import identify  # noqa: E402
-from thsa_cosim.scenario import load_scenario  # noqa: E402
+from thsa_cosim.identify import identify
+from thsa_cosim.scenario import load_scenario
 
 WIDTHS = Widths(motor=3e-3, gearbox=1e-4, nut=1e-7)
 FOUND = {"motor": ("R_s", "psi_pm", "T_fm", "b_m"), "screw": ("F_fn", "b_n"), "gearbox": ("T_fg", "b_g")}

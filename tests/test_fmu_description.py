@@ -36,6 +36,8 @@ def test_fmi3_description_has_aliases_arrays_and_intermediate_update() -> None:
     d = read_description(build.lag3())
     assert d.fmi_version == "3.0"
     assert d.variables["alias of y"].value_reference == d.variables["y"].value_reference
+    assert [v.name for v in d.outputs] == ["y", "feed", "count"]
+    assert d.capabilities["providesDirectionalDerivative"] is True
     assert d.variables["vector"].is_array
     assert d.variables["u"].intermediate_update
     assert not d.variables["single"].intermediate_update

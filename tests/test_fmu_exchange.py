@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from fmu_sources import build
 from test_fmu_plant import lag
 
 from thsa_cosim.fmu import Plant, SimulationFailure, Status
+from thsa_cosim.fmu.fmi3 import Fmi3Instance
 from thsa_cosim.signals import Signals
 
 RAMP = np.linspace(0.0, 1.0, 11)
@@ -112,13 +114,23 @@ def test_termination_by_the_fmu_is_incomplete() -> None:
         assert plant.run({"end": 0.3}, None, ["h"], np.linspace(0.0, 0.2, 3))["h"].size == 3
 
 
-def test_fmi3_events_and_exact_jacobian() -> None:
+def test_fmi3_events_and_exact_jacobian(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    original = Fmi3Instance.directional_derivative
+
+    def count(self: Fmi3Instance, *arguments: Any) -> None:
+        original(self, *arguments)
+        asked.append(arguments[2].copy())
+
+    monkeypatch.setattr(Fmi3Instance, "directional_derivative", count)
     time = np.linspace(0.0, 3.0, 301)
     inputs = Signals(time, {"u": 1.0 - np.cos(2.0 * np.pi * time)}, {})
     with Plant.open(build.lag3(), kind="model-exchange") as plant:
         found = plant.run({"tau": 0.01}, inputs, ["y", "count"], time, tolerance=1e-8)
     exact = lag(time, inputs["u"], 0.01, 1.0)
     assert np.max(np.abs(found["y"] - exact)) < 1e-6
+    assert len(asked) > 3
+    assert all(column.tolist() == [-100.0] for column in asked)
     assert found["count"][-1] == np.count_nonzero(np.diff((exact > 0.5).astype(int)))
 
 

@@ -56,6 +56,8 @@ class Variable:
     """FMI 3: may be set inside a communication step (clause 4.2.2)."""
     initial: str | None = None
     """exact, approx, calculated"""
+    is_alias: bool = False
+    """FMI 3: another name of a variable that has its own entry."""
 
     @property
     def is_float(self) -> bool:
@@ -101,12 +103,12 @@ class FmuDescription:
     @property
     def inputs(self) -> tuple[Variable, ...]:
         """Variables with causality input, in declaration order."""
-        return tuple(v for v in self.variables.values() if v.causality == "input")
+        return tuple(v for v in self.variables.values() if v.causality == "input" and not v.is_alias)
 
     @property
     def outputs(self) -> tuple[Variable, ...]:
         """Variables with causality output, in declaration order."""
-        return tuple(v for v in self.variables.values() if v.causality == "output")
+        return tuple(v for v in self.variables.values() if v.causality == "output" and not v.is_alias)
 
     @property
     def parameters(self) -> tuple[Variable, ...]:
@@ -161,7 +163,7 @@ def read_description(path: Path | str) -> FmuDescription:
         guid=raw.guid or "",
         supports_co_simulation=co_simulation is not None,
         supports_model_exchange=model_exchange is not None,
-        capabilities=_capabilities(model_exchange) | _capabilities(co_simulation),
+        capabilities=_capabilities(model_exchange) | _capabilities(co_simulation) | _plural(xml),
         variables={v.name: _variable(v, intermediate) for v in raw.modelVariables},
         default_experiment=DefaultExperiment()
         if experiment is None
@@ -201,6 +203,17 @@ def _capabilities(interface: Any) -> dict[str, bool | int]:
 _COUNTS = {"maxOutputDerivativeOrder", "recommendedIntermediateInputSmoothness"}
 
 
+def _plural(xml: bytes) -> dict[str, bool | int]:
+    """FMI 3 writes providesDirectionalDerivatives where FMI 2 has no s; fmpy reads the latter only."""
+    if b"providesDirectionalDerivatives" not in xml:
+        return {}
+    root = ElementTree.fromstring(xml)
+    flags = [
+        e.get("providesDirectionalDerivatives") for e in root if e.tag.endswith(("Exchange", "Simulation"))
+    ]
+    return {"providesDirectionalDerivative": any(flag in ("true", "1") for flag in flags)}
+
+
 def _variable(raw: Any, intermediate: set[int]) -> Variable:
     declared = raw.declaredType
 
@@ -223,6 +236,7 @@ def _variable(raw: Any, intermediate: set[int]) -> Variable:
         is_array=bool(raw.dimensions),
         intermediate_update=int(raw.valueReference) in intermediate,
         initial=raw.initial,
+        is_alias=raw.alias is not None,
     )
 
 

@@ -88,7 +88,7 @@ def plot_surface(surface: Surface, result: TuneResult, path: Path) -> None:
     axes.set_ylim(surface.y[0], surface.y[-1])
     axes.set_xlabel(f"{x_name} [{space[x_name].unit}]")
     axes.set_ylabel(f"{y_name} [{space[y_name].unit}]")
-    axes.legend(frameon=True, fontsize=7, loc="upper left", bbox_to_anchor=(0.0, 1.0))
+    axes.legend(frameon=True, fontsize=7, loc="lower right")
     _save(figure, path)
 
 

@@ -83,6 +83,9 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         raise ScenarioError(f"conditions.{command.input} is the command's input; remove it.")
     space = ParameterSpace(tuple(_gain(table, k, fmu) for k in range(len(table.parameters))))
     fixed = check.fixed(path, table, fmu, space)
+    for name in table.conditions:
+        if name in fixed or name in [p.variable for p in space.parameters]:
+            raise ScenarioError(f"conditions.{name} is set in [fixed] or tuned as well; remove one of them.")
     for key, values in {
         "before": table.before,
         **{f"compare.{n}": v for n, v in table.compare.items()},
@@ -161,11 +164,11 @@ def _command(table: TuneTable, fmu: FmuDescription) -> CommandSpec:
 
 
 def _axis(name: str, table: ConditionTable, fmu: FmuDescription, key: str) -> Axis:
-    variable = check.find_variable(fmu, name, key, fmu.inputs)
+    variable = check.find_variable(fmu, name, key, fmu.inputs + fmu.parameters)
     if variable.causality != "input":
-        raise ScenarioError(
-            f"{key}: {name!r} is a {variable.causality} of {fmu.path.name}; set it in [fixed]."
-        )
+        check.settable(fmu, name, key)
+    if not variable.is_float:
+        raise ScenarioError(f"{key}: {name!r} is a {variable.type}; only real numbers can be conditions.")
     if table.values is not None:
         values = [float(v) for v in table.values]
     else:
@@ -175,7 +178,14 @@ def _axis(name: str, table: ConditionTable, fmu: FmuDescription, key: str) -> Ax
         count = int(np.floor((table.to - table.from_) / table.step * (1 + 1e-9))) + 1
         values = [table.from_ + k * table.step for k in range(count)]
     unit = table.unit or variable.unit or "1"
-    axis = Axis(name, unit, variable.unit or unit, tuple(values), tuple(table.weights or [1.0] * len(values)))
+    axis = Axis(
+        name=name,
+        unit=unit,
+        fmu_unit=variable.unit or unit,
+        values=tuple(values),
+        weights=tuple(table.weights or [1.0] * len(values)),
+        is_input=variable.causality == "input",
+    )
     try:
         for value in values:
             check.check_range(variable, axis.to_fmu(value), key, fmu)

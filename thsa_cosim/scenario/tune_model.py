@@ -47,13 +47,17 @@ class CommandSpec:
 
 @dataclass(frozen=True)
 class Axis:
-    """One condition's values in ``unit`` (as in the scenario) with their weights; the FMU's unit differs."""
+    """One condition's values in ``unit`` (as in the scenario) with their weights; the FMU's unit may differ.
+
+    ``is_input``: an input of the FMU that stays constant, else a parameter.
+    """
 
     name: str
     unit: str
     fmu_unit: str
     values: tuple[float, ...]
     weights: tuple[float, ...]
+    is_input: bool
 
     def to_fmu(self, value: float) -> float:
         """Return ``value`` [unit] in the FMU input's unit."""
@@ -62,10 +66,11 @@ class Axis:
 
 @dataclass(frozen=True)
 class Condition:
-    """Constant inputs: ``shown`` in the scenario's units, ``inputs`` in the FMU's."""
+    """What stays constant: ``shown`` in the scenario's units, ``inputs`` and ``values`` (parameters) in the FMU's."""
 
     shown: Mapping[str, float]
     inputs: Mapping[str, float]
+    values: Mapping[str, float]
     weight: float
 
     @property
@@ -82,7 +87,9 @@ def combinations(axes: Sequence[Axis]) -> tuple[Condition, ...]:
         weight = 1.0
         for axis, k in zip(axes, picks, strict=True):
             weight *= axis.weights[k]
-        conditions.append(Condition(shown, {a.name: a.to_fmu(shown[a.name]) for a in axes}, weight))
+        inputs = {a.name: a.to_fmu(shown[a.name]) for a in axes if a.is_input}
+        values = {a.name: a.to_fmu(shown[a.name]) for a in axes if not a.is_input}
+        conditions.append(Condition(shown, inputs, values, weight))
     return tuple(conditions)
 
 

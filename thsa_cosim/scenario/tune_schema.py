@@ -57,7 +57,7 @@ class CommandTable(Table):
 
 
 class ConditionTable(Table):
-    """``[conditions.<FMU input>]``: the values under which the loop must serve, listed or as a range."""
+    """``[conditions.<FMU input or parameter>]``: what the loop must serve under, listed or as a range."""
 
     values: list[Moderate] | None = Field(default=None, min_length=1, max_length=1000)
     from_: float | None = Field(default=None, alias="from")

@@ -52,7 +52,7 @@ def build_cases(
 
 def _case(scenario: TuneScenario, condition: Condition, number: int, shifts: Mapping[str, float]) -> Case:
     command, fmu = scenario.command, scenario.fmu
-    fixed = {**scenario.fixed, **shifts}
+    fixed = {**scenario.fixed, **condition.values, **shifts}
     reduce = reducer(scenario, condition.inputs, fixed)
     columns = {command.input: command.values}
     columns |= {name: np.full(command.time.shape, value) for name, value in condition.inputs.items()}

@@ -37,6 +37,8 @@ from thsa_cosim.tune.study import open_runner, study_identity
 JOURNAL = "journal.csv"
 #: The smoothing is divided by 4 until no node breaks a hard requirement, so often at most.
 WEAKER = 6
+#: So near to a bound, as a share of its search range, a gain is at the bound.
+NEAR = 0.005
 
 Ask = Callable[[Request], Reply]
 
@@ -287,6 +289,7 @@ class _Study:
         scenario, evaluator = self.scenario, self.evaluator
         by_name = {s.name: s for s in self.scored}
         after = by_name.get("after")
+        self.notes += [note for k in sorted(self.found) for note in self._at_bounds(k)]
         if after is not None and not after.feasible:
             broken = ", ".join(name for name, x in after.excess.items() if x > 0.0)
             self.notes.append(f"No gains within the bounds keep every hard requirement; broken: {broken}.")
@@ -317,6 +320,17 @@ class _Study:
         return GroupResult(
             group.label, group.at, gains, found.cost, found.cost < INFEASIBLE, found.history, found.reason
         )
+
+    def _at_bounds(self, k: int) -> list[str]:
+        """One note for each gain that ended at a bound: there the bound decides, not the cost."""
+        best, space = self.found[k].best, self.scenario.parameters
+        sides = {"lower": best < NEAR, "upper": best > 1.0 - NEAR}
+        return [
+            f"{name} ends at its {side} bound ({self.groups[k].label}): the bound limits it, no requirement does."
+            for side, at in sides.items()
+            for name, near in zip(space.names, at.tolist(), strict=True)
+            if near
+        ]
 
     def _line(self) -> Line | None:
         spec, names = self.scenario.line, self.scenario.parameters.names

@@ -442,3 +442,16 @@ def test_a_worker_killed_from_outside_costs_one_job() -> None:
     assert [o.status for o in outcomes].count(Status.CRASH) <= 1
     assert all(o.status in (Status.OK, Status.CRASH) for o in outcomes)
     assert len(outcomes) == 9
+
+
+def test_jobs_do_not_wait_behind_a_hanging_one() -> None:
+    """Short runs make workers hoard orders; what waits behind a run that hangs goes to whoever is idle."""
+    finished: dict[int, float] = {}
+    with LocalRunner([experiment()], workers=2, deadline_s=3.0, backend="python") as runner:
+        runner.run([Job("lag")] * 100)
+        begin = time.monotonic()
+        jobs = [Job("lag")] * 20 + [fault("hang")] + [Job("lag")] * 60
+        outcomes = runner.run(jobs, lambda index, _: finished.update({index: time.monotonic() - begin}))
+    assert [o.status for o in outcomes] == [Status.TIMEOUT if i == 20 else Status.OK for i in range(81)]
+    assert finished[20] >= 3.0
+    assert max(t for i, t in finished.items() if i != 20) < 2.0

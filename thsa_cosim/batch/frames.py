@@ -3,7 +3,7 @@
 import pickle
 import struct
 from dataclasses import dataclass
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 from thsa_cosim.batch.outcome import Outcome
 
@@ -37,9 +37,8 @@ class Ready:
     """Resident bytes of the idle worker."""
 
 
-@dataclass(frozen=True)
-class Order:
-    """One job for a worker."""
+class Order(NamedTuple):
+    """One job for a worker; orders travel in lists."""
 
     serial: int
     experiment: int
@@ -48,7 +47,18 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Done:
+class Recall:
+    """Give back the orders that are not begun: another worker has nothing to do."""
+
+
+@dataclass(frozen=True)
+class Returned:
+    """The orders given back."""
+
+    serials: tuple[int, ...]
+
+
+class Done(NamedTuple):
     """One finished job."""
 
     serial: int

@@ -1,5 +1,6 @@
 """Runs batches on this machine: spawned worker processes that an FMU may crash, hang or bloat."""
 
+import contextlib
 import itertools
 import queue
 import signal
@@ -11,7 +12,7 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
-from thsa_cosim.batch.frames import Done, Order, Ready, Setup
+from thsa_cosim.batch.frames import Done, Order, Ready, Returned, Setup
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.process import Events, Progress, WorkerProcess
@@ -26,6 +27,9 @@ _START_LIMIT_S = 180.0
 """A worker that is not ready by then is taken for dead (first start: machine code is compiled)."""
 _FAILED_STARTS = 3
 _CLOSE_S = 2.0
+_AHEAD_S = 0.02
+_AHEAD = 32
+"""A worker has at hand what keeps it busy for _AHEAD_S, at most _AHEAD orders."""
 
 
 class LocalRunner:
@@ -99,6 +103,7 @@ class LocalRunner:
         self._numbers = itertools.count(1)
         self._failed_starts = 0
         self._next_tick = 0.0
+        self._typical_s = 1.0
         # Also at interpreter exit and when the runner is forgotten; must not refer to self.
         self._finalizer = weakref.finalize(self, _shut_down, self._workers, self._study)
         self._staff(workers)
@@ -158,20 +163,48 @@ class LocalRunner:
         return worker.reap()
 
     def _feed(self, batch: "_Batch") -> None:
-        """Give every worker one job, and a second one to have at hand while there are enough for all."""
-        for depth in (1, 2):
-            for worker in self._workers:
-                while (
-                    not worker.is_leaving
-                    and len(worker.assigned) < depth
-                    and len(batch.pending) >= (1 if depth == 1 else self._count)
-                ):
-                    index = batch.pending.popleft()
-                    job = batch.jobs[index]
-                    serial = next(self._serials)
-                    batch.index[serial] = index
-                    experiment = self._study.index[job.experiment]
-                    worker.give(Order(serial, experiment, dict(job.values), job.keep_signals))
+        """Give every worker a job, then some at hand, so that it never waits for the next one.
+
+        The shorter the runs, the more orders go into one message. Near the end of a batch nobody hoards.
+        """
+        ahead = min(_AHEAD, 1 + int(_AHEAD_S / self._typical_s))
+        staff = [w for w in self._workers if w.is_ready and not w.is_leaving]
+        for worker in staff:
+            if not worker.assigned and batch.pending:
+                self._give(worker, 1, batch)
+        for worker in staff:
+            if len(worker.assigned) <= (ahead + 1) // 2:
+                fair = len(batch.pending) // len(staff)
+                self._give(worker, min(1 + ahead - len(worker.assigned), fair), batch)
+
+    def _give(self, worker: WorkerProcess, count: int, batch: "_Batch") -> None:
+        orders = []
+        for _ in range(count):
+            index = batch.pending.popleft()
+            job = batch.jobs[index]
+            serial = next(self._serials)
+            batch.index[serial] = index
+            orders.append(
+                Order(serial, self._study.index[job.experiment], dict(job.values), job.keep_signals)
+            )
+        if orders:
+            worker.give(orders)
+
+    def _recall(self, batch: "_Batch") -> None:
+        """When somebody idles, take back what waits behind a run that takes long (it may hang)."""
+        if batch.pending or not any(
+            w.is_ready and not w.is_leaving and not w.assigned for w in self._workers
+        ):
+            return
+        late = time.monotonic() - _TICK_S
+        for worker in self._workers:
+            if (
+                worker.is_ready
+                and len(worker.assigned) > 1
+                and worker.since < late
+                and not worker.is_recalled
+            ):
+                worker.recall()
 
     # -- events ---------------------------------------------------------------------------------------
     def _wait(self, batch: "_Batch") -> None:
@@ -187,6 +220,8 @@ class LocalRunner:
                     self._failed_starts = 0
                 case Done() as done:
                     self._finished(worker, done, at, batch)
+                case Returned(serials=serials):
+                    self._returned(worker, serials, batch)
                 case None:
                     self._died(worker, batch, None)
         if time.monotonic() >= self._next_tick:
@@ -207,6 +242,7 @@ class LocalRunner:
         worker.runs += 1
         worker.is_leaving |= done.leaves
         outcome = done.outcome
+        self._typical_s = max(0.8 * self._typical_s + 0.2 * outcome.duration_s, 1e-6)
         if worker.console_head:
             outcome = replace(
                 outcome, console=(worker.console_head + outcome.console)[: worker.console_limit]
@@ -218,8 +254,17 @@ class LocalRunner:
             worker.is_leaving = True
             worker.ask_to_stop()  # comes after the orders that it still has
 
+    @staticmethod
+    def _returned(worker: WorkerProcess, serials: tuple[int, ...], batch: "_Batch") -> None:
+        worker.is_recalled = False
+        back = [order for order in worker.assigned if order.serial in serials]
+        for order in reversed(back):
+            worker.assigned.remove(order)
+            batch.pending.appendleft(batch.index.pop(order.serial))
+
     def _inspect(self, batch: "_Batch") -> None:
         """Kill workers that are late, too large, or do not start."""
+        self._recall(batch)
         now = time.monotonic()
         for worker in list(self._workers):
             growth = worker.watch()
@@ -229,6 +274,8 @@ class LocalRunner:
                     self._died(worker, batch, None)
             elif not worker.assigned:
                 continue
+            elif worker.progress().serial != worker.assigned[0].serial:
+                continue  # between two jobs: what it has finished is on its way
             elif self._deadline is not None and now - worker.since > self._deadline:
                 reason = f"the run was killed after {self._deadline:g} s"
                 self._died(worker, batch, (Status.TIMEOUT, reason))
@@ -237,10 +284,15 @@ class LocalRunner:
                 self._died(worker, batch, (Status.MEMORY, reason))
 
     def _died(self, worker: WorkerProcess, batch: "_Batch", cause: tuple[Status, str] | None) -> None:
-        """Reap a worker; blame the job in work, if any, and put the others back to the front."""
-        progress = worker.progress()
+        """Reap a worker; blame the job in work, if any, and put the others back to the front.
+
+        ``cause`` says why the runner itself has had to kill it.
+        """
+        accused = worker.assigned[0].serial if worker.assigned else 0
         console = worker.console()
         code = self._dismiss(worker)
+        self._hear_last_words(worker, batch)
+        progress = worker.last_progress
         orders = list(worker.assigned)
         worker.assigned.clear()
         if not worker.is_ready:
@@ -248,7 +300,9 @@ class LocalRunner:
             if self._failed_starts >= _FAILED_STARTS:
                 tail = " ".join(console.split())[-300:]
                 raise StudyError(f"Worker processes do not start (exit code {code}): {tail or 'no message'}.")
-        if orders and progress.serial == orders[0].serial:
+        # A job that began while the runner was killing its predecessor is innocent, and runs again.
+        begun = bool(orders) and progress.serial == orders[0].serial
+        if begun and (cause is None or orders[0].serial == accused):
             order = orders.pop(0)
             status, reason = cause or self._cause_of_death(code, progress)
             lasted = time.monotonic() - worker.since
@@ -256,6 +310,19 @@ class LocalRunner:
             batch.finish(batch.index.pop(order.serial), Outcome(status, reason, None, None, lasted, console))
         for order in reversed(orders):
             batch.pending.appendleft(batch.index.pop(order.serial))
+
+    def _hear_last_words(self, worker: WorkerProcess, batch: "_Batch") -> None:
+        """Take what a reaped worker had still sent out of the event queue."""
+        others = []
+        with contextlib.suppress(queue.Empty):
+            while True:
+                event = self._events.get_nowait()
+                if event[0] is not worker:
+                    others.append(event)
+                elif isinstance(event[1], Done):
+                    self._finished(worker, event[1], event[2], batch)
+        for event in others:
+            self._events.put(event)
 
     def _cause_of_death(self, code: int, progress: Progress) -> tuple[Status, str]:
         limit = self._memory_limit

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, cast
 
 import numpy as np
 
-from thsa_cosim.batch.frames import Order, Setup, Stop, read_frame, write_frame
+from thsa_cosim.batch.frames import Order, Recall, Setup, Stop, read_frame, write_frame
 from thsa_cosim.batch.memory import resident_bytes
 from thsa_cosim.batch.worker import GROWTH, PROGRESS_SLOTS, SERIAL, read_console
 from thsa_cosim.fmu.instance import Phase
@@ -65,10 +65,13 @@ class WorkerProcess:
         """Orders sent and not yet answered; the first one is in work."""
         self.is_ready = False
         self.is_leaving = False
+        self.is_recalled = False
         self.runs = 0
         self.idle_rss = 0
         self.since = time.monotonic()
         """When the first of ``assigned`` began, as well as the parent can tell; before that, the start."""
+        self.last_progress = Progress(0, "", 0)
+        """What ``reap`` found."""
         self.console_head = ""
         self.console_limit = setup.console_limit
         (folder / "cwd").mkdir(parents=True)
@@ -107,12 +110,17 @@ class WorkerProcess:
         with contextlib.suppress(OSError, ValueError):
             write_frame(self._stdin, message)
 
-    def give(self, order: Order) -> None:
-        """Send an order; the worker runs it after those it already has."""
+    def give(self, orders: list[Order]) -> None:
+        """Send orders; the worker runs them after those it already has."""
         if self.is_ready and not self.assigned:
             self.since = time.monotonic()
-        self.assigned.append(order)
-        self._send(order)
+        self.assigned.extend(orders)
+        self._send(orders)
+
+    def recall(self) -> None:
+        """Ask for the orders that are not begun; ``Returned`` is the answer."""
+        self.is_recalled = True
+        self._send(Recall())
 
     def progress(self) -> "Progress":
         """Return how far the worker is; also after its death."""
@@ -161,6 +169,7 @@ class WorkerProcess:
             else:
                 self._process.kill()
             self._process.wait()
+        self.last_progress = self.progress()
         self._thread.join(5.0)
         with contextlib.suppress(OSError):
             self._stdin.close()

@@ -21,7 +21,17 @@ from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 
-from thsa_cosim.batch.frames import Done, Order, Ready, Setup, Stop, read_frame, write_frame
+from thsa_cosim.batch.frames import (
+    Done,
+    Order,
+    Ready,
+    Recall,
+    Returned,
+    Setup,
+    Stop,
+    read_frame,
+    write_frame,
+)
 from thsa_cosim.batch.job import Experiment
 from thsa_cosim.batch.memory import limit_growth, no_core_files, private_bytes, resident_bytes
 from thsa_cosim.batch.outcome import Outcome, Status
@@ -45,6 +55,7 @@ class Worker:
     def __init__(self, setup: Setup, results: BinaryIO) -> None:
         self._setup = setup
         self._results = results
+        self._sending = threading.Lock()
         self._cwd = Path(setup.folder) / "cwd"
         with (Path(setup.folder) / "progress").open("r+b") as file:
             self._map = mmap.mmap(file.fileno(), PROGRESS_SLOTS * 8)
@@ -62,12 +73,35 @@ class Worker:
 
         def listen() -> None:
             while (message := read_frame(orders)) is not None:
-                self._orders.put(message)
                 if isinstance(message, Stop):
+                    self._orders.put(message)
                     return
+                if isinstance(message, Recall):
+                    self._send(Returned(self._take_back()))
+                else:
+                    for order in message:
+                        self._orders.put(order)
             parent_died(self._setup.root)
 
         threading.Thread(target=listen, daemon=True).start()
+
+    def _take_back(self) -> tuple[int, ...]:
+        """Take the orders that are not begun out of the queue; only the listener puts anything in."""
+        serials = []
+        with contextlib.suppress(queue.Empty):
+            while True:
+                order = self._orders.get_nowait()
+                assert isinstance(order, Order)
+                serials.append(order.serial)
+        return tuple(serials)
+
+    def _send(self, message: Any) -> None:
+        """Send from either thread."""
+        try:
+            with self._sending:
+                write_frame(self._results, message)
+        except OSError:
+            parent_died(self._setup.root)
 
     def serve(self) -> None:
         """Run orders until told to stop."""
@@ -75,17 +109,14 @@ class Worker:
         if self._setup.memory_limit is not None:
             self._floor = limit_growth(self._setup.memory_limit)
             threading.Thread(target=self._watch_memory, daemon=True).start()
-        write_frame(self._results, Ready(resident_bytes()))
+        self._send(Ready(resident_bytes()))
         while not isinstance(order := self._orders.get(), Stop):
             os.chdir(self._cwd)
             self._progress[: GROWTH + 1] = (Phase.LOAD, np.nan, 0.0, 0.0, order.serial, 0.0)
             outcome = self._run(order)
             leaves = self._live is not None and self._live.is_dead
             done = Done(order.serial, outcome, self._rss(), leaves)
-            try:
-                write_frame(self._results, done)
-            except OSError:
-                parent_died(self._setup.root)
+            self._send(done)
             self._progress[SERIAL] = 0.0
             if leaves:
                 break

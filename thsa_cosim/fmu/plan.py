@@ -33,31 +33,36 @@ class Plan:
         begin = table.copy()
         if self.mode == "mean":
             begin[:-1, linear] = 0.5 * (table[:-1, linear] + table[1:, linear])
-        self.begin = self._rows(begin)
+        # An input that never moves is set once, before the first step.
+        self.begin = self._rows(begin, moves)
         # With slopes given, linear inputs have arrived at u(t_k+1) by themselves.
         arrives = linear if self.mode == "derivative" else np.zeros_like(linear)
-        self.end = self._rows(table) if (moves & ~arrives).any() else []
+        self.end = self._rows(table, moves & ~arrives)
         uses_slopes = self.mode != "mean" and (moves & linear).any()
-        self.smooth = self._smooth_channel(table, linear) if uses_slopes else None
+        self.smooth = self._smooth_channel(table, moves & linear) if uses_slopes else None
         self.inputs, self.input_variables, self.linear = inputs, variables, linear
         self.tables: Any = None
         """Kept here by ``stepping`` between runs."""
 
-    def _rows(self, table: FloatArray) -> list[tuple[Channel, NDArray[Any]]]:
-        """One contiguous (n, variables) table per data type."""
-        return [
-            (channel, np.ascontiguousarray(table[:, list(channel.columns)].astype(channel.dtype)))
-            for channel in self.input_channels
-        ]
+    def _rows(self, table: FloatArray, wanted: NDArray[np.bool_]) -> list[tuple[Channel, NDArray[Any]]]:
+        """One contiguous (n, variables) table per data type, of the ``wanted`` columns."""
+        rows = []
+        for channel in self.input_channels:
+            inside = [i for i, c in enumerate(channel.columns) if wanted[c]]
+            if inside:
+                columns = tuple(channel.columns[i] for i in inside)
+                part = Channel(channel.suffix, channel.references[inside], channel.dtype, columns)
+                rows.append((part, np.ascontiguousarray(table[:, columns].astype(channel.dtype))))
+        return rows
 
     def _smooth_channel(
-        self, table: FloatArray, linear: NDArray[np.bool_]
+        self, table: FloatArray, wanted: NDArray[np.bool_]
     ) -> tuple[Channel, FloatArray, FloatArray, NDArray[np.int32]] | None:
         """Linear double inputs: channel, values (n, m), slopes (n-1, m), derivative orders (m,)."""
         for channel in self.input_channels:
             if channel.suffix not in ("Real", "Float64"):
                 continue
-            inside = [i for i, c in enumerate(channel.columns) if linear[c]]
+            inside = [i for i, c in enumerate(channel.columns) if wanted[c]]
             columns = [channel.columns[i] for i in inside]
             values = np.ascontiguousarray(table[:, columns])
             slopes = np.ascontiguousarray(np.diff(values, axis=0) / self.grid.steps[:, None])

@@ -14,20 +14,17 @@ from thsa_cosim.scenario.load import read_toml
 from thsa_cosim.scenario.model import SearchSpec, SimulationSpec
 from thsa_cosim.scenario.schema import KINDS
 from thsa_cosim.scenario.sentences import from_validation, one_line
+from thsa_cosim.scenario.tune_drawn import line_spec, pareto_spec, surface_spec
 from thsa_cosim.scenario.tune_model import (
     LOOP_METRICS,
     METRICS,
-    TERMS,
     Axis,
     CommandSpec,
     ControlCostSpec,
-    LineSpec,
     LoopSpec,
     MetricsSpec,
-    ParetoSpec,
     Requirement,
     ScheduleSpec,
-    SurfaceSpec,
     TuneScenario,
 )
 from thsa_cosim.scenario.tune_schema import ConditionTable, RequirementTable, TuneTable
@@ -125,9 +122,9 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         combine=table.robust.combine,
         uncertainty=read_uncertainty(path, table, axes, fmu),
         schedule=_schedule(table, axes, fmu),
-        pareto=_pareto(table),
-        line=_line(table, space),
-        surface=_surface(table, space),
+        pareto=pareto_spec(table),
+        line=line_spec(table, space),
+        surface=surface_spec(table, space),
         search=SearchSpec(**table.search.model_dump(), polish=False),
         simulation=_simulation(table),
     )
@@ -308,44 +305,9 @@ def _schedule(table: TuneTable, axes: Sequence[Axis], fmu: FmuDescription) -> Sc
     if len(set(spec.over)) < len(spec.over):
         raise ScenarioError("schedule.over names a condition twice; remove one.")
     swept = {name: _axis(name, t, fmu, f"schedule.check.{name}") for name, t in spec.check.items()}
-    return ScheduleSpec(tuple(spec.over), spec.smoothing, tuple(swept.get(a.name, a) for a in axes))
-
-
-def _pareto(table: TuneTable) -> ParetoSpec | None:
-    if table.pareto is None:
-        return None
-    known = [*TERMS, *(f"peak.{r.signal}" for r in table.requirements if r.signal)]
-    for side in (table.pareto.x, table.pareto.y):
-        if side not in known or side == "peak":
-            raise ScenarioError(f"pareto: {side!r} is no term.{did_you_mean(side, known)}")
-        if side == "effort" and table.metrics.effort is None:
-            raise ScenarioError("pareto: effort needs metrics.effort, the signal that counts.")
-        if side in LOOP_METRICS and table.loop is None:
-            raise ScenarioError(f"pareto: {side} needs the table [loop].")
-    return ParetoSpec(table.pareto.x, table.pareto.y)
-
-
-def _line(table: TuneTable, space: ParameterSpace) -> LineSpec | None:
-    if table.line is None:
-        return None
-    for name in (table.line.numerator, table.line.denominator):
-        if name not in space.names:
-            raise ScenarioError(f"line: {name!r} is no parameter.{did_you_mean(name, space.names)}")
-    return LineSpec(**table.line.model_dump())
-
-
-def _surface(table: TuneTable, space: ParameterSpace) -> SurfaceSpec | None:
-    if table.surface is None:
-        return None
-    for name in table.surface.parameters:
-        if name not in space.names:
-            raise ScenarioError(
-                f"surface.parameters: {name!r} is no parameter.{did_you_mean(name, space.names)}"
-            )
-    a, b = table.surface.parameters
-    if a == b:
-        raise ScenarioError("surface.parameters needs two different parameters.")
-    return SurfaceSpec((a, b), table.surface.points)
+    return ScheduleSpec(
+        tuple(spec.over), spec.smoothing, spec.reserve, tuple(swept.get(a.name, a) for a in axes)
+    )
 
 
 def _simulation(table: TuneTable) -> SimulationSpec:

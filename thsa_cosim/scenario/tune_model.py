@@ -1,7 +1,7 @@
 """What a tuning scenario is once it is read: frozen objects in the FMU's units."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Literal
@@ -135,6 +135,10 @@ class Requirement:
         """``overshoot`` or, for the peak of a signal, ``peak.i_q``."""
         return self.metric if self.signal is None else f"{self.metric}.{self.signal}"
 
+    def tightened(self, reserve: float) -> "Requirement":
+        """Return the same with its limit moved inwards by a share of its size."""
+        return replace(self, limit=self.limit - (reserve if self.upper else -reserve) * abs(self.limit))
+
 
 @dataclass(frozen=True)
 class LoopSpec:
@@ -174,10 +178,14 @@ class UncertaintySpec:
 
 @dataclass(frozen=True)
 class ScheduleSpec:
-    """Gains over the conditions ``over``; ``check`` holds the axes of the sweep."""
+    """Gains over the conditions ``over``; ``check`` holds the axes of the sweep.
+
+    The nodes' own searches keep ``reserve`` (a share) away from the limits, which leaves room to smooth.
+    """
 
     over: tuple[str, ...]
     smoothing: float
+    reserve: float
     check: tuple[Axis, ...]
 
 

@@ -184,6 +184,7 @@ class ScheduleTable(Table):
 
     over: list[Name] = Field(min_length=1, max_length=2)
     smoothing: NotNegative = 1.0
+    reserve: Annotated[float, Field(ge=0, lt=1)] = 0.03
     check: dict[Name, ConditionTable] = Field(default_factory=dict)
 
 

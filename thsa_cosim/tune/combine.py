@@ -73,14 +73,19 @@ def excess_of(requirement: Requirement, values: FloatArray) -> FloatArray:
     return np.asarray(np.minimum(np.maximum(over, 0.0) / requirement.scale, UNDEFINED))
 
 
-def combine(scenario: TuneScenario, names: Sequence[str], terms: FloatArray, weights: FloatArray) -> Combined:
-    """Combine the terms (c, q) of one vector's conditions with ``weights`` (c,)."""
+def combine(
+    scenario: TuneScenario,
+    names: Sequence[str],
+    terms: FloatArray,
+    weights: FloatArray,
+    requirements: Sequence[Requirement],
+) -> Combined:
+    """Combine the terms (c, q) of one vector's conditions with ``weights`` (c,) under ``requirements``."""
     per_condition = equation_7(scenario, names, terms)
     if scenario.combine == "worst":
         eq7 = float(np.max(per_condition))
     else:
         eq7 = float(np.sum(weights * per_condition) / np.sum(weights))
-    requirements = scenario.requirements
     excess = np.array(
         [float(np.max(excess_of(r, terms[:, names.index(r.name)]))) for r in requirements], dtype=np.float64
     )

@@ -184,7 +184,7 @@ class Evaluator:
         return np.stack([empty if o.reduced is None or not o.ok else o.reduced for o in outcomes])
 
     def _judge(self, group: Group, outcomes: Sequence[Outcome]) -> Combined:
-        found = combine(self._scenario, self.names, self._terms(outcomes), group.weights)
+        found = combine(self._scenario, self.names, self._terms(outcomes), group.weights, group.requirements)
         if any(not o.ok for o in outcomes):
             return Combined(np.inf, np.nan, found.worst, found.excess, False)
         return found

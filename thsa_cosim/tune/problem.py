@@ -7,7 +7,7 @@ import numpy as np
 
 from thsa_cosim.batch import Experiment
 from thsa_cosim.scenario import TuneScenario
-from thsa_cosim.scenario.tune_model import Condition, combinations
+from thsa_cosim.scenario.tune_model import Condition, Requirement, combinations
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.tune.response import reducer
 from thsa_cosim.tune.samples import samples_at
@@ -31,6 +31,7 @@ class Group:
     label: str
     at: Mapping[str, float]
     cases: tuple[Case, ...]
+    requirements: tuple[Requirement, ...]
 
     @property
     def weights(self) -> FloatArray:
@@ -76,11 +77,12 @@ def _case(scenario: TuneScenario, condition: Condition, number: int, shifts: Map
 def build_groups(scenario: TuneScenario) -> tuple[Group, ...]:
     """The group of all conditions first, then one group per node of the schedule, if there is one."""
     cases = build_cases(scenario, combinations(scenario.axes), sampled=True)
-    groups = [Group(ALL, {}, cases)]
+    groups = [Group(ALL, {}, cases, scenario.requirements)]
     if scenario.schedule is None:
         return tuple(groups)
+    tight = tuple(r.tightened(scenario.schedule.reserve) for r in scenario.requirements)
     nodes = combinations([axis for axis in scenario.axes if axis.name in scenario.schedule.over])
     for node in nodes:
         members = tuple(c for c in cases if node.shown.items() <= c.condition.shown.items())
-        groups.append(Group(node.label, node.shown, members))
+        groups.append(Group(node.label, node.shown, members, tight))
     return tuple(groups)

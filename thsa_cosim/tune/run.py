@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -69,7 +69,7 @@ def tune(
         checked = build_cases(scenario, combinations(scenario.schedule.check), sampled=False)
     open_study(folder, study_identity(scenario))
     names = Terms.of(scenario).names
-    study = _Study(scenario, groups, Group("check", {}, tuple(checked)), names)
+    study = _Study(scenario, groups, Group("check", {}, tuple(checked), scenario.requirements), names)
     with Journal.open(folder / JOURNAL, scenario.parameters.names, names) as journal:
         try:
             experiments = [case.experiment for case in cases_of([*groups, study.check])]
@@ -264,14 +264,14 @@ class _Study:
 
     def _broken(self, evaluator: Evaluator, vectors: FloatArray) -> float:
         """By how much the nodes' gains (k, n) in the unit cube break hard requirements, summed."""
-        space = self.scenario.parameters
-        requests = [
-            (k + 1, Request(space.physical(np.clip(v, 0.0, 1.0))[None, :])) for k, v in enumerate(vectors)
-        ]
-        costs = np.array([float(reply.costs[0]) for reply in evaluator.serve(requests)])
-        return float(
-            np.sum(np.maximum(costs / INFEASIBLE, 1.0) - 1.0) + np.count_nonzero(costs >= INFEASIBLE)
-        )
+        space, requirements = self.scenario.parameters, self.scenario.requirements
+        total = 0.0
+        for group, vector in zip(self.groups[1:], vectors, strict=True):
+            limits = replace(group, requirements=requirements)
+            found = evaluator.evaluate(limits, [space.decode(np.clip(vector, 0.0, 1.0))])[0].combined
+            hard = [x for r, x in zip(requirements, found.excess.tolist(), strict=True) if r.hard]
+            total += sum(hard) if np.isfinite(found.eq7) else np.inf
+        return total
 
     def _check(self, evaluator: Evaluator, schedule: GainSchedule) -> ScheduleCheck:
         spec = self.scenario
@@ -281,6 +281,9 @@ class _Study:
         sets += [[dict(values)] * len(conditions) for values in constant.values()]
         found = evaluator.evaluate_each(self.check, sets)
         scored = [self._score(name, f) for name, f in zip(["schedule", *constant], found, strict=True)]
+        if not scored[0].feasible:
+            broken = ", ".join(name for name, x in scored[0].excess.items() if x > 0.0)
+            self.notes.append(f"Between its nodes the schedule breaks a hard requirement: {broken}.")
         return ScheduleCheck(conditions, tuple(scored))
 
     # -- result ---------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from fmu_sources import build
 from test_fmu_plant import lag
 
 from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
+from thsa_cosim.batch.inbox import ThreadInbox
 from thsa_cosim.errors import FmuError, ParameterError, StudyError
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -455,3 +456,13 @@ def test_jobs_do_not_wait_behind_a_hanging_one() -> None:
     assert [o.status for o in outcomes] == [Status.TIMEOUT if i == 20 else Status.OK for i in range(81)]
     assert finished[20] >= 3.0
     assert max(t for i, t in finished.items() if i != 20) < 2.0
+
+
+def test_listening_by_threads_does_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What Windows uses, whose pipes cannot be selected."""
+    monkeypatch.setattr("thsa_cosim.batch.local.open_inbox", ThreadInbox)
+    kinds = ["segfault", "good", "exit", "child", "good", "hang", "flood", "fatal", "nan", "good"]
+    with LocalRunner([experiment()], workers=2, deadline_s=1.5, backend="python") as runner:
+        outcomes = runner.run([fault("none" if kind == "good" else kind) for kind in kinds])
+    wanted = [Status.OK if kind == "good" else FAULTS[kind][0] for kind in kinds]
+    assert [o.status for o in outcomes] == wanted

@@ -1,7 +1,9 @@
 """Messages between a runner and its workers: length-prefixed pickles over pipes."""
 
+import os
 import pickle
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, BinaryIO, NamedTuple
 
@@ -73,15 +75,16 @@ class Stop:
     """Last message to a worker; a pipe that ends without it means that the parent has died."""
 
 
-def write_frame(pipe: BinaryIO, message: Any) -> None:
-    """Send one message."""
+def write_frame(descriptor: int, message: Any) -> None:
+    """Send one message; OSError if nobody reads any more."""
     data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
-    pipe.write(_LENGTH.pack(len(data)) + data)
-    pipe.flush()
+    frame = memoryview(_LENGTH.pack(len(data)) + data)
+    while frame:
+        frame = frame[os.write(descriptor, frame) :]
 
 
 def read_frame(pipe: BinaryIO) -> Any | None:
-    """Receive one message; None when the pipe has ended (torn messages count as ended)."""
+    """Wait for one message; None when the pipe has ended (a torn message counts as ended)."""
     try:
         head = pipe.read(_LENGTH.size)
         if len(head) < _LENGTH.size:
@@ -91,3 +94,22 @@ def read_frame(pipe: BinaryIO) -> Any | None:
     except (OSError, ValueError):
         return None
     return pickle.loads(data) if len(data) == length else None
+
+
+class FrameReader:
+    """Puts messages together from what a pipe has at a time."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+
+    def feed(self, data: bytes) -> Iterator[Any]:
+        """Take some bytes; yield the messages that are complete now."""
+        self._buffer += data
+        while len(self._buffer) >= _LENGTH.size:
+            (length,) = _LENGTH.unpack_from(self._buffer)
+            end = _LENGTH.size + length
+            if len(self._buffer) < end:
+                return
+            message = pickle.loads(memoryview(self._buffer)[_LENGTH.size : end].tobytes())
+            del self._buffer[:end]
+            yield message

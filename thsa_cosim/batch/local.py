@@ -1,8 +1,6 @@
 """Runs batches on this machine: spawned worker processes that an FMU may crash, hang or bloat."""
 
-import contextlib
 import itertools
-import queue
 import signal
 import time
 import weakref
@@ -10,12 +8,13 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from thsa_cosim.batch.frames import Done, Order, Ready, Returned, Setup
+from thsa_cosim.batch.inbox import Inbox, open_inbox
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.outcome import Outcome, Status
-from thsa_cosim.batch.process import Events, Progress, WorkerProcess
+from thsa_cosim.batch.process import Progress, WorkerProcess
 from thsa_cosim.batch.runner import OnOutcome, check_jobs
 from thsa_cosim.batch.study import Study
 from thsa_cosim.errors import ParameterError, StudyError
@@ -97,7 +96,7 @@ class LocalRunner:
             reuse=reuse,
             main=self._study.main,
         )
-        self._events: Events = queue.SimpleQueue()
+        self._inbox = open_inbox()
         self._workers: list[WorkerProcess] = []
         self._serials = itertools.count(1)
         self._numbers = itertools.count(1)
@@ -105,7 +104,7 @@ class LocalRunner:
         self._next_tick = 0.0
         self._typical_s = 1.0
         # Also at interpreter exit and when the runner is forgotten; must not refer to self.
-        self._finalizer = weakref.finalize(self, _shut_down, self._workers, self._study)
+        self._finalizer = weakref.finalize(self, _shut_down, self._workers, self._inbox, self._study)
         self._staff(workers)
 
     # -- public ---------------------------------------------------------------------------------------
@@ -154,7 +153,7 @@ class LocalRunner:
         present = sum(not w.is_leaving for w in self._workers)
         for _ in range(present, wanted):
             folder = self._study.folder / "workers" / str(next(self._numbers))
-            self._workers.append(WorkerProcess(self._setup, folder, self._events))
+            self._workers.append(WorkerProcess(self._setup, folder, self._inbox))
 
     def _dismiss(self, worker: WorkerProcess) -> int:
         """Kill and forget a worker; return its exit code."""
@@ -168,7 +167,8 @@ class LocalRunner:
         The shorter the runs, the more orders go into one message. Near the end of a batch nobody hoards.
         """
         ahead = min(_AHEAD, 1 + int(_AHEAD_S / self._typical_s))
-        staff = [w for w in self._workers if w.is_ready and not w.is_leaving]
+        # Nothing is sent to a worker that is being recalled: its listener may be waiting to answer.
+        staff = [w for w in self._workers if w.is_ready and not w.is_leaving and not w.is_recalled]
         for worker in staff:
             if not worker.assigned and batch.pending:
                 self._give(worker, 1, batch)
@@ -209,24 +209,24 @@ class LocalRunner:
     # -- events ---------------------------------------------------------------------------------------
     def _wait(self, batch: "_Batch") -> None:
         """Handle one event, or a tick of the clock."""
-        try:
-            worker, message, at = self._events.get(timeout=self._patience())
-        except queue.Empty:
-            worker = None
-        if worker is not None and worker in self._workers:
-            match message:
-                case Ready(rss=rss):
-                    worker.is_ready, worker.idle_rss, worker.since = True, rss, at
-                    self._failed_starts = 0
-                case Done() as done:
-                    self._finished(worker, done, at, batch)
-                case Returned(serials=serials):
-                    self._returned(worker, serials, batch)
-                case None:
-                    self._died(worker, batch, None)
+        event = self._inbox.get(self._patience())
+        if event is not None and event[0] in self._workers:
+            self._handle(*event, batch)
         if time.monotonic() >= self._next_tick:
             self._next_tick = time.monotonic() + _TICK_S
             self._inspect(batch)
+
+    def _handle(self, worker: WorkerProcess, message: Any, at: float, batch: "_Batch") -> None:
+        match message:
+            case Ready(rss=rss):
+                worker.is_ready, worker.idle_rss, worker.since = True, rss, at
+                self._failed_starts = 0
+            case Done() as done:
+                self._finished(worker, done, at, batch)
+            case Returned(serials=serials):
+                self._returned(worker, serials, batch)
+            case None:
+                self._died(worker, batch, None)
 
     def _patience(self) -> float:
         """Seconds until something has to be looked at."""
@@ -268,8 +268,10 @@ class LocalRunner:
         now = time.monotonic()
         for worker in list(self._workers):
             growth = worker.watch()
-            worker.end_group_if_dead()
-            if not worker.is_ready:
+            if worker.has_died():
+                # As a rule its pipe has told so before, but a child of the FMU may hold that open.
+                self._died(worker, batch, None)
+            elif not worker.is_ready:
                 if now - worker.since > _START_LIMIT_S:
                     self._died(worker, batch, None)
             elif not worker.assigned:
@@ -291,7 +293,9 @@ class LocalRunner:
         accused = worker.assigned[0].serial if worker.assigned else 0
         console = worker.console()
         code = self._dismiss(worker)
-        self._hear_last_words(worker, batch)
+        for _, message, at in worker.last_words:
+            if isinstance(message, Done):
+                self._finished(worker, message, at, batch)
         progress = worker.last_progress
         orders = list(worker.assigned)
         worker.assigned.clear()
@@ -310,19 +314,6 @@ class LocalRunner:
             batch.finish(batch.index.pop(order.serial), Outcome(status, reason, None, None, lasted, console))
         for order in reversed(orders):
             batch.pending.appendleft(batch.index.pop(order.serial))
-
-    def _hear_last_words(self, worker: WorkerProcess, batch: "_Batch") -> None:
-        """Take what a reaped worker had still sent out of the event queue."""
-        others = []
-        with contextlib.suppress(queue.Empty):
-            while True:
-                event = self._events.get_nowait()
-                if event[0] is not worker:
-                    others.append(event)
-                elif isinstance(event[1], Done):
-                    self._finished(worker, event[1], event[2], batch)
-        for event in others:
-            self._events.put(event)
 
     def _cause_of_death(self, code: int, progress: Progress) -> tuple[Status, str]:
         limit = self._memory_limit
@@ -360,7 +351,7 @@ class _Batch:
         return [outcome for outcome in self._outcomes if outcome is not None]
 
 
-def _shut_down(workers: list[WorkerProcess], study: Study) -> None:
+def _shut_down(workers: list[WorkerProcess], inbox: Inbox, study: Study) -> None:
     """Stop all workers, idle ones politely, and remove the study's folder."""
     for worker in workers:
         if not worker.assigned:
@@ -369,4 +360,5 @@ def _shut_down(workers: list[WorkerProcess], study: Study) -> None:
     for worker in workers:
         worker.join(0.0 if worker.assigned or not worker.is_ready else until - time.monotonic())
     workers.clear()
+    inbox.close()
     study.remove()

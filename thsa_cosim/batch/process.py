@@ -3,12 +3,10 @@
 import contextlib
 import json
 import os
-import queue
 import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections import deque
 from dataclasses import dataclass, replace
@@ -17,7 +15,8 @@ from typing import Any, BinaryIO, cast
 
 import numpy as np
 
-from thsa_cosim.batch.frames import Order, Recall, Setup, Stop, read_frame, write_frame
+from thsa_cosim.batch.frames import Order, Recall, Setup, Stop, write_frame
+from thsa_cosim.batch.inbox import Event, Inbox
 from thsa_cosim.batch.memory import resident_bytes
 from thsa_cosim.batch.worker import GROWTH, PROGRESS_SLOTS, SERIAL, read_console
 from thsa_cosim.fmu.instance import Phase
@@ -38,8 +37,6 @@ _ONE_THREAD = (
 _FLOOD = 2**20
 """Bytes of console output above which the file is emptied while the run goes on."""
 
-Events = queue.SimpleQueue[tuple["WorkerProcess", Any, float]]
-
 
 @dataclass(frozen=True)
 class Progress:
@@ -55,11 +52,10 @@ class Progress:
 class WorkerProcess:
     """A spawned worker: sends orders, queues what comes back, explains its death.
 
-    Every message, and ``None`` when the worker is gone, is put into ``events`` with this object and the
-    time (``time.monotonic``) at which it came.
+    Its messages arrive in ``inbox``, under this object.
     """
 
-    def __init__(self, setup: Setup, folder: Path, events: Events) -> None:
+    def __init__(self, setup: Setup, folder: Path, inbox: Inbox) -> None:
         self.folder = folder
         self.assigned: deque[Order] = deque()
         """Orders sent and not yet answered; the first one is in work."""
@@ -72,6 +68,8 @@ class WorkerProcess:
         """When the first of ``assigned`` began, as well as the parent can tell; before that, the start."""
         self.last_progress = Progress(0, "", 0)
         """What ``reap`` found."""
+        self.last_words: list[Event] = []
+        """What had arrived, or was on its way, when the process was reaped."""
         self.console_head = ""
         self.console_limit = setup.console_limit
         (folder / "cwd").mkdir(parents=True)
@@ -90,9 +88,8 @@ class WorkerProcess:
                 start_new_session=True,
             )
         self._stdin = cast(BinaryIO, self._process.stdin)
-        self._stdout = cast(BinaryIO, self._process.stdout)
-        self._thread = threading.Thread(target=self._listen, args=(events,), daemon=True)
-        self._thread.start()
+        self._inbox = inbox
+        inbox.add(self, cast(BinaryIO, self._process.stdout))
         self._send(replace(setup, folder=str(folder)))
 
     @property
@@ -100,15 +97,10 @@ class WorkerProcess:
         """Process id."""
         return self._process.pid
 
-    def _listen(self, events: Events) -> None:
-        while (message := read_frame(self._stdout)) is not None:
-            events.put((self, message, time.monotonic()))
-        events.put((self, None, time.monotonic()))
-
     def _send(self, message: Any) -> None:
-        # A dead worker is noticed by its listener; what was sent to it is not lost but requeued.
+        # A dead worker is noticed by the end of its pipe; what was sent to it is not lost but requeued.
         with contextlib.suppress(OSError, ValueError):
-            write_frame(self._stdin, message)
+            write_frame(self._stdin.fileno(), message)
 
     def give(self, orders: list[Order]) -> None:
         """Send orders; the worker runs them after those it already has."""
@@ -170,20 +162,19 @@ class WorkerProcess:
                 self._process.kill()
             self._process.wait()
         self.last_progress = self.progress()
-        self._thread.join(5.0)
         with contextlib.suppress(OSError):
             self._stdin.close()
-        if not self._thread.is_alive():  # else a runaway grandchild holds the pipe, and close would block
-            self._stdout.close()
+        self.last_words += self._inbox.remove(self)
         shutil.rmtree(self.folder, ignore_errors=True)
         return int(self._process.returncode)
 
-    def end_group_if_dead(self) -> None:
-        """Kill the children of a worker that has died: they may hold its pipe open, which hides its death."""
-        if self._process.returncode is None and hasattr(os, "waitid"):
-            with contextlib.suppress(OSError):
-                if os.waitid(os.P_PID, self._process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:
-                    os.killpg(self._process.pid, signal.SIGKILL)
+    def has_died(self) -> bool:
+        """Whether the process has ended; it is not reaped yet."""
+        if self._process.returncode is not None or not hasattr(os, "waitid"):
+            return self._process.poll() is not None
+        with contextlib.suppress(OSError):
+            return os.waitid(os.P_PID, self._process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+        return True
 
     def ask_to_stop(self) -> None:
         """Tell the worker to end after the orders that it has."""
@@ -191,5 +182,7 @@ class WorkerProcess:
 
     def join(self, patience_s: float) -> int:
         """Wait for the worker to end by itself, then reap it."""
-        self._thread.join(max(patience_s, 0.0))
+        until = time.monotonic() + patience_s
+        while not self.has_died() and time.monotonic() < until:
+            time.sleep(0.002)
         return self.reap()

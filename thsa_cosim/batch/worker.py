@@ -7,6 +7,8 @@ prints can get between the messages.
 
 import contextlib
 import ctypes
+import gc
+import io
 import mmap
 import os
 import pickle
@@ -52,7 +54,7 @@ GROWTH = 5
 class Worker:
     """Runs orders; ``serve`` is the main loop."""
 
-    def __init__(self, setup: Setup, results: BinaryIO) -> None:
+    def __init__(self, setup: Setup, results: int) -> None:
         self._setup = setup
         self._results = results
         self._sending = threading.Lock()
@@ -106,6 +108,7 @@ class Worker:
     def serve(self) -> None:
         """Run orders until told to stop."""
         self._warm_up()
+        gc.freeze()  # what the imports have made lives as long as the process
         if self._setup.memory_limit is not None:
             self._floor = limit_growth(self._setup.memory_limit)
             threading.Thread(target=self._watch_memory, daemon=True).start()
@@ -205,8 +208,6 @@ class Worker:
 
     def _console(self) -> str:
         """Return what was printed since the last run, cut; empty the console file and the scratch folder."""
-        sys.stdout.flush()
-        sys.stderr.flush()
         if self._libc is not None:
             self._libc.fflush(None)
         for entry in os.scandir(self._cwd):
@@ -253,7 +254,7 @@ def main(root: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     no_core_files()
     # The pipes move to other descriptors (not inherited by what an FMU starts); 0, 1, 2 become harmless.
-    orders, results = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    orders, results = os.fdopen(os.dup(0), "rb"), os.dup(1)
     setup = read_frame(orders)
     if not isinstance(setup, Setup):
         parent_died(root)
@@ -261,6 +262,9 @@ def main(root: str) -> None:
     os.dup2(null, 0)
     os.close(null)
     os.dup2(2, 1)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(write_through=True, errors="replace")
     worker = Worker(setup, results)
     worker.listen(orders)
     if setup.main is not None:
@@ -268,5 +272,4 @@ def main(root: str) -> None:
 
         spawn.prepare(setup.main)
     worker.serve()
-    results.close()
     os._exit(0)  # native destructors and threads of an FMU could still crash or hang

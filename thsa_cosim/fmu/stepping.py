@@ -5,6 +5,7 @@ loops do the same calls in the same order: machine code (``compiled.advance``) a
 reference, which it equals bit for bit.
 """
 
+import copy
 import ctypes
 from collections.abc import Sequence
 from typing import Any
@@ -136,6 +137,7 @@ class Tables:
             self.slopes[:] = *row, table.ctypes.data, table.strides[0]
         self.do_step = instance.library.address(instance.library.function(f"{instance.prefix}DoStep"))
         self.flags, self.last = np.zeros(8, dtype=np.uint8), np.zeros(1)
+        self.signals: Signals | None = None
 
     def advance(
         self, loop: Any, instance: Instance, plan: Plan, progress: FloatArray
@@ -182,11 +184,19 @@ def step_through(instance: Instance, plan: Plan, progress: FloatArray, compiled:
     if tables.singles:  # the loop looks at doubles only
         for k in range(len(plan.grid.times)):
             _refuse_not_finite(plan, tables.results, k)
-    values: dict[str, FloatArray] = {}
+    rows: list[FloatArray] = [np.empty(0)] * len(plan.outputs)
     for channel, table in tables.results:
-        for i, column in enumerate(channel.columns):
-            values[plan.outputs[column]] = np.array(table[:, i], dtype=np.float64)
-    return Signals(plan.grid.times, {name: values[name] for name in plan.outputs}, plan.units)
+        # One copy for all, whose rows are contiguous signals.
+        for column, row in zip(channel.columns, table.T.astype(np.float64, order="C"), strict=True):
+            rows[column] = row
+    values = dict(zip(plan.outputs, rows, strict=True))
+    if tables.signals is None:
+        tables.signals = Signals(plan.grid.times, values, plan.units)
+        return tables.signals
+    # The time axis was checked when the first run built its signals.
+    signals = copy.copy(tables.signals)
+    object.__setattr__(signals, "values", values)
+    return signals
 
 
 def _refuse_not_finite(plan: Plan, results: Sequence[tuple[Channel, NDArray[Any]]], k: int) -> None:

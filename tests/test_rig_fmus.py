@@ -1,4 +1,4 @@
-"""The shipped FMUs against the reference plant, which knows nothing of Modelica or FMI (issues A and B)."""
+"""The shipped FMUs against the reference plant, which knows nothing of Modelica or FMI."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -119,7 +119,7 @@ def test_start_values_are_those_of_the_rig(actuator: Plant) -> None:
 
 
 def test_ramp_of_table_iv(actuator: Plant) -> None:
-    """Issue A: i_q, v and x within 1e-4 of their range; our bound is 1000 times narrower."""
+    """i_q, v and x within 1e-4 of their range; our bound is 1000 times narrower."""
     time = samples(1.2005)
     found = actuator.run({}, inputs(time, -30.0, v_cmd=RAMP, F_load=RAMP_LOAD), OUTPUTS, time)
     assert largest_error(found, expected_ramp(widths_of(actuator))) < 1e-7
@@ -127,7 +127,7 @@ def test_ramp_of_table_iv(actuator: Plant) -> None:
 
 @pytest.mark.parametrize("temperature", [25.0, -55.0])
 def test_driven_schedule_at_rtol_1e_6(actuator: Plant, temperature: float) -> None:
-    """Issue B: within 1e-5 of range of Radau, and moved by less than 1e-5 by half the communication step."""
+    """Within 1e-5 of range of Radau, and moved by less than 1e-5 by half the communication step."""
     time = samples(DRIVEN_A_END)
     half = np.sort(np.concatenate([time, 0.5 * (time[1:] + time[:-1])]))
     driven = inputs(time, temperature, v_cmd=DRIVEN_A, F_load=DRIVEN_A_LOAD)

@@ -1,4 +1,4 @@
-"""Do the stated 95 % intervals hold the true values?  python benchmarks/coverage.py [--seeds 40] [--bench motor ...]
+"""Do the stated 95 % intervals hold the true values?  python benchmarks/intervals.py [--seeds 40] [--bench motor ...]
 
 Each case: the bench is simulated by the reference plant of the tests (hand-written equations, SciPy; no FMU),
 sensor noise with a new seed and quantisation are added, and the scenario of that bench identifies what was

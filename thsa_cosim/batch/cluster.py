@@ -15,7 +15,6 @@ import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any, Self
 
@@ -25,6 +24,7 @@ from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.runner import OnOutcome, check_experiment, check_jobs
 from thsa_cosim.errors import FmuError, MissingExtraError, StudyError
 from thsa_cosim.fmu.description import FmuDescription, read_description
+from thsa_cosim.fmu.scratch import ScratchFolder
 
 _CONNECT_S = 20.0
 _ATTEMPTS = 3
@@ -159,7 +159,7 @@ class ClusterRunner:
     def close(self) -> None:
         """Have the workers drop the study, and disconnect."""
         with contextlib.suppress(Exception):
-            self._client.run(close_study, self._parcel.digest)
+            self._client.run(close_study, self._parcel.digest, on_error="ignore")
         with contextlib.suppress(Exception):
             self._client.close()
 
@@ -221,8 +221,8 @@ class _Unpacked:
 
     def __init__(self, parcel: Parcel) -> None:
         self._parcel = parcel
-        self._folder = TemporaryDirectory(prefix="thsa-cosim-cluster-")
-        folder = Path(self._folder.name)
+        self._folder = ScratchFolder()
+        folder = self._folder.path
         for name, content in parcel.archives.items():
             (folder / name).write_bytes(content)
         self._experiments = [replace(e, fmu=folder / e.fmu) for e in parcel.experiments]
@@ -253,7 +253,7 @@ class _Unpacked:
             idle, self._idle = self._idle, []
         for runner in idle:
             runner.close()
-        self._folder.cleanup()
+        self._folder.remove()
 
 
 _studies: dict[str, _Unpacked] = {}

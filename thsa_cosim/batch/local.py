@@ -60,7 +60,7 @@ class LocalRunner:
         workers
             Number of processes.
         deadline_s
-            Wall time after which a run is killed, s; None: never.
+            Wall time after which a run is killed (to 0.05 s), s; None: never.
         memory_limit_mb
             MiB that one worker may grow beyond its idle size; None: no limit.
         reuse
@@ -209,7 +209,7 @@ class LocalRunner:
     # -- events ---------------------------------------------------------------------------------------
     def _wait(self, batch: "_Batch") -> None:
         """Handle one event, or a tick of the clock."""
-        event = self._inbox.get(self._patience())
+        event = self._inbox.get(_TICK_S)
         if event is not None and event[0] in self._workers:
             self._handle(*event, batch)
         if time.monotonic() >= self._next_tick:
@@ -227,14 +227,6 @@ class LocalRunner:
                 self._returned(worker, serials, batch)
             case None:
                 self._died(worker, batch, None)
-
-    def _patience(self) -> float:
-        """Seconds until something has to be looked at."""
-        if self._deadline is None:
-            return _TICK_S
-        now = time.monotonic()
-        due = [w.since + self._deadline - now for w in self._workers if w.is_ready and w.assigned]
-        return max(0.001, min(due, default=_TICK_S)) if due and min(due) < _TICK_S else _TICK_S
 
     def _finished(self, worker: WorkerProcess, done: Done, at: float, batch: "_Batch") -> None:
         worker.assigned.popleft()
@@ -274,16 +266,23 @@ class LocalRunner:
             elif not worker.is_ready:
                 if now - worker.since > _START_LIMIT_S:
                     self._died(worker, batch, None)
-            elif not worker.assigned:
-                continue
-            elif worker.progress().serial != worker.assigned[0].serial:
-                continue  # between two jobs: what it has finished is on its way
-            elif self._deadline is not None and now - worker.since > self._deadline:
-                reason = f"the run was killed after {self._deadline:g} s"
-                self._died(worker, batch, (Status.TIMEOUT, reason))
-            elif self._memory_limit is not None and growth > 1.1 * self._memory_limit:
-                reason = f"the run outgrew {self._memory_limit / 2**20:.0f} MiB and was killed"
-                self._died(worker, batch, (Status.MEMORY, reason))
+            elif worker.assigned:
+                self._check_limits(worker, growth, batch)
+
+    def _check_limits(self, worker: WorkerProcess, growth: int, batch: "_Batch") -> None:
+        progress, now = worker.progress(), time.monotonic()
+        if progress.serial != worker.assigned[0].serial:
+            return  # between two jobs: what it has finished is on its way
+        if progress.began is None:
+            if now - worker.since > _START_LIMIT_S:
+                reason = f"the experiment was not read within {_START_LIMIT_S:g} s"
+                self._died(worker, batch, (Status.LOAD_ERROR, reason))
+        elif self._deadline is not None and now - progress.began > self._deadline:
+            reason = f"the run was killed after {self._deadline:g} s"
+            self._died(worker, batch, (Status.TIMEOUT, reason))
+        elif self._memory_limit is not None and growth > 1.1 * self._memory_limit:
+            reason = f"the run outgrew {self._memory_limit / 2**20:.0f} MiB and was killed"
+            self._died(worker, batch, (Status.MEMORY, reason))
 
     def _died(self, worker: WorkerProcess, batch: "_Batch", cause: tuple[Status, str] | None) -> None:
         """Reap a worker; blame the job in work, if any, and put the others back to the front.
@@ -309,7 +308,7 @@ class LocalRunner:
         if begun and (cause is None or orders[0].serial == accused):
             order = orders.pop(0)
             status, reason = cause or self._cause_of_death(code, progress)
-            lasted = time.monotonic() - worker.since
+            lasted = time.monotonic() - (progress.began or worker.since)
             reason = f"{reason} {progress.where}"
             batch.finish(batch.index.pop(order.serial), Outcome(status, reason, None, None, lasted, console))
         for order in reversed(orders):

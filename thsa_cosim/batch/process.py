@@ -18,7 +18,7 @@ import numpy as np
 from thsa_cosim.batch.frames import Order, Recall, Setup, Stop, write_frame
 from thsa_cosim.batch.inbox import Event, Inbox
 from thsa_cosim.batch.memory import resident_bytes
-from thsa_cosim.batch.worker import GROWTH, PROGRESS_SLOTS, SERIAL, read_console
+from thsa_cosim.batch.worker import BEGAN, GROWTH, PROGRESS_SLOTS, SERIAL, read_console
 from thsa_cosim.fmu.instance import Phase
 
 _BOOT = (
@@ -47,6 +47,8 @@ class Progress:
     where: str
     growth: int
     """Bytes by which the job in work has grown the process, if a limit is set."""
+    began: float | None
+    """When its FMU was first touched (time.monotonic); None: not yet."""
 
 
 class WorkerProcess:
@@ -65,8 +67,8 @@ class WorkerProcess:
         self.runs = 0
         self.idle_rss = 0
         self.since = time.monotonic()
-        """When the first of ``assigned`` began, as well as the parent can tell; before that, the start."""
-        self.last_progress = Progress(0, "", 0)
+        """When the worker went over to the first of ``assigned``; before that, when it was started."""
+        self.last_progress = Progress(0, "", 0, None)
         """What ``reap`` found."""
         self.last_words: list[Event] = []
         """What had arrived, or was on its way, when the process was reaped."""
@@ -131,7 +133,7 @@ class WorkerProcess:
             Phase.REDUCE: "in the cost",
             Phase.IDLE: "after the run",
         }
-        return Progress(int(values[SERIAL]), where[phase], int(values[GROWTH]))
+        return Progress(int(values[SERIAL]), where[phase], int(values[GROWTH]), float(values[BEGAN]) or None)
 
     def console(self) -> str:
         """Return what the worker printed since its last finished run, cut."""

@@ -35,7 +35,7 @@ from thsa_cosim.batch.frames import (
     write_frame,
 )
 from thsa_cosim.batch.job import Experiment
-from thsa_cosim.batch.memory import limit_growth, no_core_files, private_bytes, resident_bytes
+from thsa_cosim.batch.memory import ResidentMeter, limit_growth, no_core_files, private_bytes
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.errors import ThsaCosimError
 from thsa_cosim.fmu.description import FmuDescription
@@ -49,6 +49,8 @@ SERIAL = 4
 """Slot of the progress block that holds the serial of the job in work, 0 between jobs."""
 GROWTH = 5
 """Slot that holds by how many bytes the job in work has grown this process, if a limit is set."""
+BEGAN = 6
+"""Slot that holds when the job's FMU was first touched (time.monotonic, the same clock in all processes)."""
 
 
 class Worker:
@@ -68,7 +70,7 @@ class Worker:
         self._orders: queue.SimpleQueue[Order | Stop] = queue.SimpleQueue()
         self._libc = None if os.name == "nt" else ctypes.CDLL(None)
         self._floor = 0
-        self._next_look, self._resident = 0.0, 0
+        self._meter = ResidentMeter()
 
     def listen(self, orders: BinaryIO) -> None:
         """Start the thread that reads orders ahead and notices when the parent dies."""
@@ -112,26 +114,19 @@ class Worker:
         if self._setup.memory_limit is not None:
             self._floor = limit_growth(self._setup.memory_limit)
             threading.Thread(target=self._watch_memory, daemon=True).start()
-        self._send(Ready(resident_bytes()))
+        self._send(Ready(self._meter.read()))
         while not isinstance(order := self._orders.get(), Stop):
             os.chdir(self._cwd)
-            self._progress[: GROWTH + 1] = (Phase.LOAD, np.nan, 0.0, 0.0, order.serial, 0.0)
+            self._progress[: BEGAN + 1] = (Phase.LOAD, np.nan, 0.0, 0.0, order.serial, 0.0, 0.0)
             outcome = self._run(order)
             leaves = self._live is not None and self._live.is_dead
-            done = Done(order.serial, outcome, self._rss(), leaves)
+            done = Done(order.serial, outcome, self._meter.read(), leaves)
             self._send(done)
             self._progress[SERIAL] = 0.0
             if leaves:
                 break
         if self._live is not None and not self._live.is_dead:
             self._live.close()
-
-    def _rss(self) -> int:
-        """Resident bytes, looked up a few times per second at most."""
-        now = time.monotonic()
-        if now >= self._next_look:
-            self._next_look, self._resident = now + 0.2, resident_bytes()
-        return self._resident
 
     def _warm_up(self) -> None:
         """Load machine code before the first deadline starts to count."""
@@ -146,6 +141,8 @@ class Worker:
         status, reason = Status.OK, ""
         try:
             experiment, plant = self._experiment(order.experiment)
+            # Deadlines count from here: reading recordings and importing reducers is not the FMU's fault.
+            self._progress[BEGAN] = time.monotonic()
             values = {**experiment.fixed, **order.values}
             signals = plant.run(
                 values, experiment.inputs, experiment.outputs, experiment.time, tolerance=experiment.tolerance

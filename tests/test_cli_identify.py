@@ -1,4 +1,7 @@
-"""``thsa-cosim identify`` as a subprocess: results, resuming after Ctrl-C and SIGKILL, refusals."""
+"""``thsa-cosim identify``: results, resuming after Ctrl-C and SIGKILL, refusals.
+
+What depends on a process of its own (the first run, kills) is a subprocess; the rest calls the same entry here.
+"""
 
 import json
 import os
@@ -6,12 +9,15 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
+from thsa_cosim import cli
 from thsa_cosim.ssv import read_ssv
 
 ROOT = Path(__file__).parents[1]
@@ -56,6 +62,25 @@ def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[st
     return subprocess.run(
         command(*arguments), capture_output=True, text=True, timeout=300, check=False, **options
     )
+
+
+class Here:
+    """Command lines in this process: exit code, stdout and stderr; plots are left empty to save their time."""
+
+    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
+        self._capsys = capsys
+
+    def __call__(self, *arguments: object) -> subprocess.CompletedProcess[str]:
+        self._capsys.readouterr()
+        code = cli.run_command([str(a) for a in arguments])
+        captured = self._capsys.readouterr()
+        return subprocess.CompletedProcess(arguments, code, captured.out, captured.err)
+
+
+@pytest.fixture
+def here(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Here:
+    monkeypatch.setattr(Figure, "savefig", lambda self, path, **_: Path(path).touch())
+    return Here(capsys)
 
 
 def result_of(folder: Path) -> dict:
@@ -130,12 +155,12 @@ def test_tables_are_printed_plainly_into_a_pipe(study) -> None:
     assert "0 failed" in err
 
 
-def test_the_finished_study_is_taken_from_its_journal(study) -> None:
+def test_the_finished_study_is_taken_from_its_journal(study, here: Here) -> None:
     scenario, folder, _ = study
     before = result_of(folder)
     rows = len((folder / "journal.csv").read_text().splitlines())
     held_out = ROOT / "scenarios" / "recordings" / "motor_m10.parquet"
-    again = run("identify", scenario, "--validate", held_out, "-o", folder, "--json", "--workers", 1)
+    again = here("identify", scenario, "--validate", held_out, "-o", folder, "--json", "--workers", 1)
     assert again.returncode == 0, again.stderr
     assert json.loads(again.stdout) == before
     assert len((folder / "journal.csv").read_text().splitlines()) == rows
@@ -143,7 +168,9 @@ def test_the_finished_study_is_taken_from_its_journal(study) -> None:
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
-def test_an_ended_study_continues_to_the_undisturbed_result(study, tmp_path: Path, how: int) -> None:
+def test_an_ended_study_continues_to_the_undisturbed_result(
+    study, here: Here, tmp_path: Path, how: int
+) -> None:
     scenario, folder, _ = study
     held_out = ROOT / "scenarios" / "recordings" / "motor_m10.parquet"
     arguments = ("identify", scenario, "--validate", held_out, "-o", tmp_path / "study", "--workers", 2)
@@ -166,25 +193,25 @@ def test_an_ended_study_continues_to_the_undisturbed_result(study, tmp_path: Pat
         assert out == ""
     else:
         assert not (tmp_path / "study" / "result.json").exists()
-    done = run(*arguments)
+    done = here(*arguments)
     assert done.returncode == 0, done.stderr
     assert result_of(tmp_path / "study") == result_of(folder)
 
 
-def test_another_seed_or_scenario_is_refused_in_the_same_folder(study, tmp_path: Path) -> None:
+def test_another_seed_or_scenario_is_refused_in_the_same_folder(study, here: Here, tmp_path: Path) -> None:
     scenario, folder, _ = study
-    refused = run("identify", scenario, "-o", folder, "--seed", 99)
+    refused = here("identify", scenario, "-o", folder, "--seed", 99)
     assert refused.returncode == 2
     assert refused.stderr.startswith("error: ")
     assert refused.stderr.count("\n") == 1
     other = small_scenario(tmp_path, **{"upper = 5.0": "upper = 4.0"})
     held_out = ROOT / "scenarios" / "recordings" / "motor_m10.parquet"
-    refused = run("identify", other, "--validate", held_out, "-o", folder)
+    refused = here("identify", other, "--validate", held_out, "-o", folder)
     assert refused.returncode == 2
     assert "holds a study of another scenario; choose another folder with -o" in refused.stderr
 
 
-def test_without_current_nor_speed_the_friction_is_not_determined(tmp_path: Path) -> None:
+def test_without_current_nor_speed_the_friction_is_not_determined(here: Here, tmp_path: Path) -> None:
     """Steady speed shows friction in the current only; the voltage holds R_s times that current."""
     scenario = small_scenario(
         tmp_path,
@@ -197,7 +224,7 @@ def test_without_current_nor_speed_the_friction_is_not_determined(tmp_path: Path
     )
     text = scenario.read_text().replace("stop = 0.6\nstop = 3.0\n", "stop = 0.6\n")
     scenario.write_text(text.replace("stop = 3.0\nstop = 0.6\n", "stop = 0.6\n"))
-    done = run("identify", scenario, "-o", tmp_path / "study")
+    done = here("identify", scenario, "-o", tmp_path / "study")
     assert done.returncode == 0, done.stderr
     (point,) = result_of(tmp_path / "study")["points"]
     undetermined = {n: p for n, p in point["parameters"].items() if not p["identifiable"]}
@@ -206,14 +233,17 @@ def test_without_current_nor_speed_the_friction_is_not_determined(tmp_path: Path
     assert "not determined by these data" in done.stdout
 
 
-def test_a_model_that_never_runs_is_exit_code_3(tmp_path: Path) -> None:
-    scenario = small_scenario(
-        tmp_path, ("p25",), **{"deadline = 60.0": "deadline = 1e-9", "population = 45": "population = 5"}
-    )
-    done = run("identify", scenario, "-o", tmp_path / "study")
+def test_a_model_that_never_runs_is_exit_code_3(here: Here, tmp_path: Path) -> None:
+    broken = tmp_path / "Motor.fmu"
+    with zipfile.ZipFile(ROOT / "fmus" / "Motor.fmu") as whole, zipfile.ZipFile(broken, "w") as archive:
+        for name in whole.namelist():
+            archive.writestr(name, b"no library" if name.startswith("binaries/") else whole.read(name))
+    scenario = small_scenario(tmp_path, ("p25",), **{"population = 45": "population = 5"})
+    done = here("identify", scenario, "--fmu", broken, "-o", tmp_path / "study")
     assert done.returncode == 3
-    assert done.stderr.strip().splitlines()[-1].startswith("error: ")
-    assert "no simulation succeeded" in done.stderr
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith("error: ")
+    assert "no simulation succeeded: all of the first 5 simulations failed" in last
     assert "Traceback" not in done.stderr
 
 

@@ -15,6 +15,7 @@ makes a round slower.
 import argparse
 import multiprocessing
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -62,10 +63,10 @@ def mean_square(signals: Signals) -> np.ndarray:
 _state = {}
 
 
-def pool_start(fmu: str) -> None:
+def pool_start(fmu: str, folder: str) -> None:
     import fmpy
 
-    _state["folder"] = fmpy.extract(fmu)
+    _state["folder"] = fmpy.extract(fmu, folder)
     _state["description"] = fmpy.read_model_description(fmu)
     drive = recording()
     names = ["time", *drive.names]
@@ -146,9 +147,10 @@ def main() -> None:
     bare = context.Process(target=bare_loop, args=(fmu, there), daemon=True)
     bare.start()
     with (
+        tempfile.TemporaryDirectory() as unpacked,
         LocalRunner([experiment], workers=workers) as ours,
         LocalRunner([experiment], workers=1) as one,
-        context.Pool(workers, pool_start, (fmu,)) as pool,
+        context.Pool(workers, pool_start, (fmu, unpacked)) as pool,
     ):
         # Everyone starts, loads and runs once before the clock does.
         ours.run(jobs[: 4 * workers])

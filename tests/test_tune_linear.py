@@ -87,6 +87,7 @@ def test_python_control_reads_the_same_margins() -> None:
     loop = opened(THSA, -55e3)  # aiding: slowly unstable when opened
     response = loop.response(FREQUENCIES)
     ours, theirs = margins(loop), margins_by_control(FREQUENCIES, response)
+    assert margins(loop, "python-control") == theirs
     assert ours.phase_margin == pytest.approx(theirs.phase_margin, abs=0.1)
     assert ours.gain_margin == pytest.approx(theirs.gain_margin, rel=0.02)
 

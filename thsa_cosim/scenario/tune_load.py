@@ -1,12 +1,13 @@
 """From the TOML file of a tuning to a :class:`TuneScenario`, checked against its FMU."""
 
+import importlib.util
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from pydantic import ValidationError
 
-from thsa_cosim.errors import InputError, ScenarioError, UnitError, did_you_mean
+from thsa_cosim.errors import InputError, MissingExtraError, ScenarioError, UnitError, did_you_mean
 from thsa_cosim.fmu import FmuDescription, Variable, read_description
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.scenario import check
@@ -287,7 +288,10 @@ def _loop(
     for name in names:
         if name not in space.names:
             raise ScenarioError(f"loop.gains: {name!r} is no parameter.{did_you_mean(name, space.names)}")
-    return LoopSpec(table.loop.signal, at, tuple(space[name].variable for name in names))
+    if table.loop.margins == "python-control" and importlib.util.find_spec("control") is None:
+        raise MissingExtraError("loop.margins = 'python-control'", "control")
+    variables = tuple(space[name].variable for name in names)
+    return LoopSpec(table.loop.signal, at, variables, table.loop.margins)
 
 
 def _schedule(table: TuneTable, axes: Sequence[Axis], fmu: FmuDescription) -> ScheduleSpec | None:

@@ -144,12 +144,14 @@ class Requirement:
 class LoopSpec:
     """The loop is opened at ``signal``; linearised with the response's state at ``at`` [s].
 
-    ``gains`` are FMU parameters that act on the plant through that signal alone.
+    ``gains`` are FMU parameters that act on the plant through that signal alone; ``margins`` says who reads
+    gain and phase margin off the loop's frequency response.
     """
 
     signal: str
     at: float
     gains: tuple[str, ...]
+    margins: Literal["own", "python-control"] = "own"
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,6 +162,7 @@ class LoopTable(Table):
     signal: Name
     at: NotNegative | None = None
     gains: list[Name] | None = Field(default=None, min_length=1)
+    margins: Literal["own", "python-control"] = "own"
 
 
 class RobustTable(Table):

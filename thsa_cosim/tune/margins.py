@@ -32,9 +32,10 @@ class Margins:
     bandwidth: float
 
 
-def margins(loop: OpenLoop) -> Margins:
-    """Margins of an opened loop."""
-    found = margins_of(FREQUENCIES, loop.response(FREQUENCIES))
+def margins(loop: OpenLoop, reader: str = "own") -> Margins:
+    """Margins of an opened loop; ``reader`` "own" or "python-control" (ten times slower, the same numbers)."""
+    read = margins_by_control if reader == "python-control" else margins_of
+    found = read(FREQUENCIES, loop.response(FREQUENCIES))
     closed = loop.a + np.outer(loop.b, loop.c)
     if float(np.max(np.linalg.eigvals(closed).real)) <= DRIFT:
         return found

@@ -55,6 +55,7 @@ class LoopTask:
     gains: tuple[str, ...]
     signal: str
     at: float
+    reader: str
 
     @property
     def recorded(self) -> tuple[str, ...]:
@@ -78,7 +79,7 @@ class LoopTask:
             )
         except SimulationFailure:
             return Margins(np.nan, np.nan, np.nan)
-        return margins(loop)
+        return margins(loop, self.reader)
 
 
 _FOLDERS: dict[str, Path] = {}
@@ -178,5 +179,6 @@ def reducer(
             loop.gains,
             loop.signal,
             loop.at,
+            loop.margins,
         ),
     )

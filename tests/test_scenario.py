@@ -272,7 +272,7 @@ WRONG = [
     # kinds
     ("kind", ..., "kind is missing", 'supported kinds are "identify" or "simulate"'),
     ("kind", "identfy", "kind is 'identfy'", "Did you mean 'identify'?"),
-    ("kind", "tune", "kind is 'tune'; supported kinds are", ""),
+    ("kind", "tune", "kind is 'tune': run 'thsa-cosim tune ", ""),
     ("kind", 3, "kind is 3", ""),
     # against the FMU
     (

@@ -89,7 +89,7 @@ def parse(path: Path, data: Mapping[str, Any]) -> CommonTable:
     """Return the tables as their kind's pydantic model; ScenarioError in one sentence."""
     kind = data.get("kind")
     if kind == "tune":
-        raise ScenarioError(one_line(f"{path} is a scenario of kind 'tune': run 'thsa-cosim tune {path}'."))
+        raise ScenarioError(one_line(f"{path}: kind is 'tune': run 'thsa-cosim tune {path}'."))
     if not isinstance(kind, str) or kind not in KINDS:
         what = "is missing" if kind is None else f"is {kind!r}"
         hint = did_you_mean(kind, KINDS) if isinstance(kind, str) else ""

@@ -22,6 +22,7 @@ from pathlib import Path
 # The benchmark next door is called coverage.py, and numba imports a package of that name.
 sys.path[:] = [entry for entry in sys.path if Path(entry).resolve() != Path(__file__).resolve().parent]
 
+import fmpy
 import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, LocalRunner
@@ -66,7 +67,7 @@ _state = {}
 def pool_start(fmu: str, folder: str) -> None:
     import fmpy
 
-    _state["folder"] = fmpy.extract(fmu, folder)
+    _state["folder"] = folder
     _state["description"] = fmpy.read_model_description(fmu)
     drive = recording()
     names = ["time", *drive.names]
@@ -143,14 +144,16 @@ def main() -> None:
         assert all(outcome.ok for outcome in outcomes), next(o.reason for o in outcomes if not o.ok)
         return len(jobs) / elapsed
 
+    unpacked = tempfile.TemporaryDirectory()
+    fmpy.extract(fmu, unpacked.name)
     here, there = context.Pipe()
     bare = context.Process(target=bare_loop, args=(fmu, there), daemon=True)
     bare.start()
     with (
-        tempfile.TemporaryDirectory() as unpacked,
+        unpacked,
         LocalRunner([experiment], workers=workers) as ours,
         LocalRunner([experiment], workers=1) as one,
-        context.Pool(workers, pool_start, (fmu, unpacked)) as pool,
+        context.Pool(workers, pool_start, (fmu, unpacked.name)) as pool,
     ):
         # Everyone starts, loads and runs once before the clock does.
         ours.run(jobs[: 4 * workers])

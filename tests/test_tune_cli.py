@@ -3,8 +3,10 @@
 import csv
 import json
 import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +107,31 @@ def test_a_half_finished_study_ends_like_an_undisturbed_one(tmp_path: Path) -> N
     other = run("tune", path, "-o", whole, "--seed", 9)
     assert other.returncode == 2
     assert "another seed" in other.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs SIGINT")
+def test_ctrl_c_keeps_what_was_evaluated(tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    command = [
+        sys.executable,
+        "-m",
+        "thsa_cosim.cli",
+        "tune",
+        str(SCENARIOS / "table4.toml"),
+        "-o",
+        str(folder),
+    ]
+    process = subprocess.Popen([*command, "--workers", "1"], stderr=subprocess.PIPE, text=True)
+    journal, until = folder / "journal.csv", time.monotonic() + 60.0
+    while not (journal.exists() and journal.read_bytes().count(b"\n") > 90) and time.monotonic() < until:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "continue with: thsa-cosim tune" in errors
+    result = result_of(folder)
+    assert (result["status"], result["gains"], result["after"]) == ("interrupted", {}, None)
+    assert journal.read_bytes().endswith(b"\n")
 
 
 def test_what_cannot_be_met_is_said_and_leaves_with_3(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(
     not (ROOT / "fmus" / "Motor.fmu").exists(), reason="fmus/Motor.fmu has not been exported"
 )
 TRUE = {
-    -30.0: {"R_s": 0.498, "psi_pm": 0.0946, "T_fm": 0.0561, "b_m": 4.105e-5},
+    -30.0: {"R_s": 0.498, "psi_pm": 0.0946, "T_fm": 0.0561, "b_m": 4.57e-5},
     25.0: {"R_s": 1.915625, "psi_pm": 0.099, "T_fm": 0.04125, "b_m": 4.83e-5},
 }
 

@@ -307,6 +307,7 @@ def test_stale_fmu_is_noticed(tmp_path, capsys):
     found = stale(manifest)
     assert set(found) == {
         "THSA.fmu",
+        "THSA_FeedForward.fmu",
         "Gearbox.fmu",
         "Screw.fmu",
         "fmi3/THSA.fmu",

@@ -274,7 +274,8 @@ def test_workers_are_recycled_by_count_and_by_memory() -> None:
         used = [float(o.reduced[0]) for o in outcomes if o.reduced is not None]
         assert len(set(used)) == 3
         assert sorted(used, key=used.index) == used
-        assert all("from the reducer" in o.console for o in outcomes)
+        assert [(o.status, o.reason) for o in outcomes] == [(Status.OK, "")] * 12
+        assert [o.console.strip() for o in outcomes] == ["from the reducer"] * 12
     with LocalRunner([pids], workers=1, recycle_growth_mb=100.0, backend="python") as runner:
         # Each of these leaks 4 MiB in each of its last 10 steps.
         leaking = runner.run([fault("leak", at=0.9)] * 8)

@@ -74,6 +74,7 @@ static fmi2Status misbehave(Model* m, double t, double h) {
                 char* block = malloc(n);
                 memset(block, 1, n);
                 kept = block;
+                usleep(200); /* growth is sampled: nothing real fills memory faster */
             }
         case FLOOD:
             for (int i = 0; i < 20000 && !m->flooded; i++) {

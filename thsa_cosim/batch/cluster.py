@@ -9,6 +9,7 @@ elsewhere, by Dask; each job has exactly one outcome.
 import contextlib
 import hashlib
 import importlib
+import io
 import pickle
 import threading
 import uuid
@@ -202,8 +203,17 @@ def _pack(experiments: Sequence[Experiment], options: dict[str, Any]) -> Parcel:
             name = f"{hashlib.sha256(content).hexdigest()[:16]}-{path.name}"
             archives[name] = content
         travelling.append(replace(experiment, fmu=Path(name)))
-    digest = hashlib.sha256(pickle.dumps((travelling, sorted(archives), options)))
+    digest = hashlib.sha256(_content((travelling, sorted(archives), options)))
     return Parcel(digest.hexdigest(), tuple(travelling), archives, options)
+
+
+def _content(value: object) -> bytes:
+    """Pickle by content alone: without memo, equal strings that are not the same object make no difference."""
+    stream = io.BytesIO()
+    pickler = pickle.Pickler(stream)
+    pickler.fast = True
+    pickler.dump(value)
+    return stream.getvalue()
 
 
 def _task_failure(result: Any) -> Outcome:

@@ -66,7 +66,6 @@ class WorkerProcess:
         self.is_recalled = False
         self.runs = 0
         self.idle_rss = 0
-        self._peak_growth = 0
         self.since = time.monotonic()
         """When the worker went over to the first of ``assigned``; before that, when it was started."""
         self.last_progress = Progress(0, "", 0, None)
@@ -163,25 +162,13 @@ class WorkerProcess:
                     os.killpg(self._process.pid, signal.SIGKILL)
             else:
                 self._process.kill()
-            self._wait()
-        self.last_progress = replace(
-            progress := self.progress(), growth=max(progress.growth, self._peak_growth)
-        )
+            self._process.wait()
+        self.last_progress = self.progress()
         with contextlib.suppress(OSError):
             self._stdin.close()
         self.last_words += self._inbox.remove(self)
         shutil.rmtree(self.folder, ignore_errors=True)
         return int(self._process.returncode)
-
-    def _wait(self) -> None:
-        """Wait for the end; learn how far the process had grown, which no poll can miss."""
-        if not sys.platform.startswith("linux"):
-            self._process.wait()
-            return
-        _, status, usage = os.wait4(self._process.pid, 0)
-        self._process.returncode = os.waitstatus_to_exitcode(status)
-        if self.idle_rss:
-            self._peak_growth = usage.ru_maxrss * 1024 - self.idle_rss
 
     def has_died(self) -> bool:
         """Whether the process has ended; it is not reaped yet."""

@@ -194,7 +194,7 @@ class Worker:
         while True:
             growth = private_bytes() - self._floor
             self._progress[GROWTH] = max(self._progress[GROWTH], growth)
-            time.sleep(0.02)
+            time.sleep(0.002)
 
     def _memory_verdict(self, status: Status, reason: str) -> tuple[Status, str]:
         """Blame memory for a failure during which the process came near its limit."""
@@ -205,6 +205,8 @@ class Worker:
 
     def _console(self) -> str:
         """Return what was printed since the last run, cut; empty the console file and the scratch folder."""
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
         if self._libc is not None:
             self._libc.fflush(None)
         for entry in os.scandir(self._cwd):
@@ -261,7 +263,7 @@ def main(root: str) -> None:
     os.dup2(2, 1)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(write_through=True, errors="replace")
+            stream.reconfigure(line_buffering=True, errors="replace")
     worker = Worker(setup, results)
     worker.listen(orders)
     if setup.main is not None:

@@ -4,7 +4,7 @@ import csv
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from thsa_cosim import __version__
-from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Runner
+from thsa_cosim.batch import Experiment, Job, Outcome
 from thsa_cosim.costs import nrmse, rmse
 from thsa_cosim.errors import ScenarioError, StudyError
 from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario import Scenario
+from thsa_cosim.scenario import Scenario, open_runner
 from thsa_cosim.signals import FloatArray, Signals
 
 RESULT = "result.json"
@@ -129,7 +129,9 @@ def simulate(
         if on_recording is not None:
             on_recording(done, len(cases))
 
-    with _open_runner(scenario, [experiment for *_, experiment in cases], workers, cluster) as runner:
+    experiments = [experiment for *_, experiment in cases]
+    useful = min(workers, max(len(experiments), 1))
+    with open_runner(scenario.simulation, experiments, useful, cluster) as runner:
         outcomes = runner.run([Job(e.name) for *_, e in cases], count)
     results = tuple(
         _compare(scenario, recording, role, outcome)
@@ -181,31 +183,6 @@ def _grid(scenario: Scenario, recording: Recording) -> FloatArray:
             f"{scenario.path}: simulation.step = {step:g} s is longer than {recording.path}; lower it."
         )
     return np.asarray(time[0] + step * np.arange(count))
-
-
-def _open_runner(
-    scenario: Scenario, experiments: Sequence[Experiment], workers: int, cluster: str | None
-) -> Runner:
-    spec = scenario.simulation
-    if cluster is not None:
-        from thsa_cosim.batch.cluster import ClusterRunner
-
-        return ClusterRunner(
-            experiments,
-            cluster,
-            deadline_s=spec.deadline,
-            memory_limit_mb=spec.memory_mb,
-            reuse=spec.reuse,
-            kind=spec.interface,
-        )
-    return LocalRunner(
-        experiments,
-        workers=min(workers, max(len(experiments), 1)),
-        deadline_s=spec.deadline,
-        memory_limit_mb=spec.memory_mb,
-        reuse=spec.reuse,
-        kind=spec.interface,
-    )
 
 
 def _compare(scenario: Scenario, recording: Recording, role: str, outcome: Outcome) -> SimulatedRecording:

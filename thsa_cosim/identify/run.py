@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from thsa_cosim import __version__
-from thsa_cosim.batch import Job, Journal, LocalRunner, Runner
+from thsa_cosim.batch import Experiment, Job, Journal, Runner
 from thsa_cosim.errors import InputError, StudyError
 from thsa_cosim.identify.compare import compare, summarise
 from thsa_cosim.identify.evaluate import Evaluator, Reply, Request, residual_experiment, terms_experiment
@@ -20,7 +20,7 @@ from thsa_cosim.identify.problem import Case, Given, PointProblem, build_case, b
 from thsa_cosim.identify.results import Comparison, IdentifyResult, LawResult, PointResult, Progress
 from thsa_cosim.identify.study import open_study
 from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario import Scenario
+from thsa_cosim.scenario import Scenario, open_runner
 from thsa_cosim.search import EvolutionSettings, Generation
 
 JOURNAL = "journal.csv"
@@ -58,7 +58,8 @@ def identify(
     study = _Study(scenario, points, held_out)
     with Journal.open(folder / JOURNAL, names, channels) as journal:
         try:
-            with _open_runner(scenario, points, held_out, workers, cluster) as runner:
+            experiments = _experiments(points, held_out)
+            with open_runner(scenario.simulation, experiments, workers, cluster) as runner:
                 evaluator = Evaluator(runner, journal, points, names, channels, on_progress)
                 study.search(evaluator)
                 study.validate(runner)
@@ -239,35 +240,12 @@ def _held_out_cases(scenario: Scenario) -> list[tuple[Case, Recording]]:
     return cases
 
 
-def _open_runner(
-    scenario: Scenario,
-    points: Sequence[PointProblem],
-    held_out: Sequence[tuple[Case, Recording]],
-    workers: int,
-    cluster: str | None,
-) -> Runner:
+def _experiments(
+    points: Sequence[PointProblem], held_out: Sequence[tuple[Case, Recording]]
+) -> list[Experiment]:
+    """Per fit recording one for the cost and one for the residuals; per held-out recording its signals."""
     experiments = []
     for point in points:
         for case in point.cases:
             experiments += [terms_experiment(case, point.error), residual_experiment(case)]
-    experiments += [case.experiment(f"validate/{case.name}", None) for case, _ in held_out]
-    spec = scenario.simulation
-    if cluster is not None:
-        from thsa_cosim.batch.cluster import ClusterRunner
-
-        return ClusterRunner(
-            experiments,
-            cluster,
-            deadline_s=spec.deadline,
-            memory_limit_mb=spec.memory_mb,
-            reuse=spec.reuse,
-            kind=spec.interface,
-        )
-    return LocalRunner(
-        experiments,
-        workers=workers,
-        deadline_s=spec.deadline,
-        memory_limit_mb=spec.memory_mb,
-        reuse=spec.reuse,
-        kind=spec.interface,
-    )
+    return experiments + [case.experiment(f"validate/{case.name}", None) for case, _ in held_out]

@@ -2,7 +2,8 @@
 
 ``schema`` holds the file's tables (one pydantic class each, one class per kind), ``model`` the frozen objects
 that the use cases get, ``load`` turns the one into the other, ``check`` holds a scenario against its FMU and
-``sentences`` turns a wrong key or value into one sentence; ``stages`` runs several scenarios in order.
+``sentences`` turns a wrong key or value into one sentence; ``stages`` runs several scenarios in order,
+``runner`` opens the processes that ``[simulation]`` asks for.
 The ``tune_`` modules are the same for tunings, which need no recordings.
 """
 
@@ -16,6 +17,7 @@ from thsa_cosim.scenario.model import (
     SimulationSpec,
     TemperaturePoint,
 )
+from thsa_cosim.scenario.runner import open_runner
 from thsa_cosim.scenario.schema import KINDS
 from thsa_cosim.scenario.stages import Stage, StagedScenario, hand_on, load_study
 from thsa_cosim.scenario.tune_load import load_tune
@@ -37,4 +39,5 @@ __all__ = [
     "load_scenario",
     "load_study",
     "load_tune",
+    "open_runner",
 ]

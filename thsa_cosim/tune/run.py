@@ -12,7 +12,7 @@ from thsa_cosim.batch import Journal
 from thsa_cosim.errors import StudyError
 from thsa_cosim.identify import Progress, open_study
 from thsa_cosim.identify.interleave import interleave
-from thsa_cosim.scenario import TuneScenario
+from thsa_cosim.scenario import TuneScenario, open_runner
 from thsa_cosim.scenario.tune_model import combinations
 from thsa_cosim.search import EvolutionResult, EvolutionSettings, Generation, evolve
 from thsa_cosim.signals import FloatArray
@@ -32,7 +32,7 @@ from thsa_cosim.tune.results import (
     TuneResult,
 )
 from thsa_cosim.tune.schedule import GainSchedule, smooth
-from thsa_cosim.tune.study import open_runner, study_identity
+from thsa_cosim.tune.study import study_identity
 
 JOURNAL = "journal.csv"
 #: The smoothing is divided by 4 until no node breaks a hard requirement, so often at most.
@@ -73,7 +73,7 @@ def tune(
     with Journal.open(folder / JOURNAL, scenario.parameters.names, names) as journal:
         try:
             experiments = [case.experiment for case in cases_of([*groups, study.check])]
-            with open_runner(scenario, experiments, workers, cluster) as runner:
+            with open_runner(scenario.simulation, experiments, workers, cluster) as runner:
                 evaluator = Evaluator(scenario, runner, journal, groups, names, on_progress)
                 study.run(evaluator, journal)
         except KeyboardInterrupt:

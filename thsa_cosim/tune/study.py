@@ -1,13 +1,11 @@
-"""What makes two tunings the same study, and the runner of one."""
+"""What makes two tunings the same study."""
 
 import hashlib
 import json
-from collections.abc import Sequence
 from dataclasses import asdict
 
 import numpy as np
 
-from thsa_cosim.batch import Experiment, LocalRunner, Runner
 from thsa_cosim.scenario import TuneScenario
 
 
@@ -33,29 +31,3 @@ def study_identity(scenario: TuneScenario) -> dict[str, object]:
 
 def _plain(value: object) -> object:
     return value.tolist() if isinstance(value, np.ndarray) else vars(value) | {"type": type(value).__name__}
-
-
-def open_runner(
-    scenario: TuneScenario, experiments: Sequence[Experiment], workers: int, cluster: str | None
-) -> Runner:
-    """Local worker processes, or those of the Dask scheduler at ``cluster``."""
-    spec = scenario.simulation
-    if cluster is not None:
-        from thsa_cosim.batch.cluster import ClusterRunner
-
-        return ClusterRunner(
-            experiments,
-            cluster,
-            deadline_s=spec.deadline,
-            memory_limit_mb=spec.memory_mb,
-            reuse=spec.reuse,
-            kind=spec.interface,
-        )
-    return LocalRunner(
-        experiments,
-        workers=workers,
-        deadline_s=spec.deadline,
-        memory_limit_mb=spec.memory_mb,
-        reuse=spec.reuse,
-        kind=spec.interface,
-    )

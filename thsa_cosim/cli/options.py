@@ -1,0 +1,150 @@
+"""What the study commands share: their options, where a study goes, and how it ends."""
+
+import datetime
+import functools
+import os
+import shlex
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypedDict
+
+import click
+
+from thsa_cosim.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+PATH = click.Path(path_type=Path)
+
+P = ParamSpec("P")
+
+
+class Overrides(TypedDict):
+    """What the command line replaces in a scenario: keyword arguments of its loader."""
+
+    fit: tuple[Path, ...]
+    validate: tuple[Path, ...]
+    seed: int | None
+    fmu: Path | None
+
+
+class Place(TypedDict):
+    """Where a study runs and is kept: keyword arguments of the use cases."""
+
+    folder: Path
+    workers: int
+    cluster: str | None
+
+
+@dataclass(frozen=True)
+class StudyOptions:
+    """The arguments of a study command as they were given."""
+
+    scenario: Path
+    fit: tuple[Path, ...]
+    validate: tuple[Path, ...]
+    output: Path | None
+    seed: int | None
+    fmu: Path | None
+    workers: int | None
+    cluster: str | None
+    quiet: bool
+    as_json: bool
+
+    @property
+    def overrides(self) -> Overrides:
+        """What replaces the scenario's own recordings, seed and FMU."""
+        return {"fit": self.fit, "validate": self.validate, "seed": self.seed, "fmu": self.fmu}
+
+    def place(self, suffix: str = "") -> Place:
+        """Return folder, workers and cluster, with their defaults; ``suffix`` goes into the folder's."""
+        return {
+            "folder": self.output or default_folder(self.scenario, suffix),
+            "workers": self.workers or cores(),
+            "cluster": self.cluster,
+        }
+
+    def check_kind(self, kind: str, wanted: str) -> None:
+        """InputError, with the command to use, if the scenario is of another kind."""
+        if kind != wanted:
+            raise InputError(
+                f"{self.scenario} is a scenario of kind {kind!r}: run 'thsa-cosim {kind} {self.scenario}'."
+            )
+
+    def conclude(self, result: Path, files: int, show: Callable[["Console"], None]) -> None:
+        """Print result.json at ``result``, or what ``show`` prints and where the files are, or nothing."""
+        if self.as_json:
+            click.echo(result.read_text(encoding="utf-8"), nl=False)
+        elif not self.quiet:
+            out = console()
+            show(out)
+            out.print(f"\n{files} files in {result.parent}; the numbers are in {result}", soft_wrap=True)
+
+
+_OPTIONS = (
+    click.argument("scenario", type=PATH),
+    click.option("--fit", type=PATH, multiple=True, help="A recording to fit, instead of the scenario's."),
+    click.option("--validate", type=PATH, multiple=True, help="A recording to hold out, likewise."),
+    click.option(
+        "-o", "--output", type=PATH, default=None, help="Study folder; an existing one is continued."
+    ),
+    click.option("--seed", type=click.IntRange(min=0), default=None, help="Seed instead of the scenario's."),
+    click.option("--fmu", type=PATH, default=None, help="FMU instead of the scenario's."),
+    click.option(
+        "--workers", type=click.IntRange(min=1), default=None, help="Processes; default: all cores."
+    ),
+    click.option("--cluster", default=None, help="Address of a Dask scheduler instead of local processes."),
+    click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors."),
+    click.option("--json", "as_json", is_flag=True, help="Print result.json instead of tables."),
+)
+"""In the order in which help shows them."""
+
+
+def study_options(command: Callable[Concatenate[StudyOptions, P], None]) -> Callable[..., None]:
+    """Give a command the scenario argument and all shared options, gathered in its first parameter."""
+
+    @functools.wraps(command)
+    def gathered(*args: P.args, **given: P.kwargs) -> None:
+        values: Mapping[str, Any] = given
+        shared = {name: values[name] for name in StudyOptions.__dataclass_fields__}
+        own: Any = {name: value for name, value in values.items() if name not in shared}
+        command(StudyOptions(**shared), *args, **own)
+
+    decorated: Callable[..., None] = gathered
+    for option in reversed(_OPTIONS):
+        decorated = option(decorated)
+    return decorated
+
+
+class Interrupted(Exception):
+    """A study was interrupted and has written what it has; the message is the command that continues it."""
+
+    def __init__(self, command: str, options: StudyOptions, folder: Path) -> None:
+        arguments = list(sys.argv[1:]) or [command, str(options.scenario)]
+        if options.output is None:
+            arguments += ["-o", str(folder)]
+        super().__init__(shlex.join(["thsa-cosim", *arguments]))
+
+
+def cores() -> int:
+    """Number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def default_folder(scenario: Path, suffix: str = "") -> Path:
+    """``studies/<scenario>-<date>``: the same command on the same day continues the same study."""
+    return Path("studies") / f"{scenario.stem}{suffix}-{datetime.date.today().isoformat()}"
+
+
+def console(*, stderr: bool = False) -> "Console":
+    """Return a console for stdout or stderr; in a pipe it is plain and wide."""
+    from rich.console import Console
+
+    found = Console(stderr=stderr)
+    # A pipe has no width; 80 columns would fold every table.
+    return found if found.is_terminal else Console(stderr=stderr, width=140)

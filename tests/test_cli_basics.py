@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import thsa_cosim
 from thsa_cosim import cli
+from thsa_cosim.cli.options import Interrupted, StudyOptions
 from thsa_cosim.errors import FmuError, MissingExtraError, StudyError
 
 ROOT = Path(__file__).parents[1]
@@ -185,15 +186,16 @@ def test_every_exception_is_one_sentence(
 
 
 def test_the_command_to_continue_names_the_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(scenario: str, output: Path | None, folder: Path) -> str:
+        options = StudyOptions(Path(scenario), (), (), output, None, None, None, None, False, False)
+        return str(Interrupted("identify", options, folder))
+
     monkeypatch.setattr(sys, "argv", ["thsa-cosim", "identify", "my scenario.toml", "--seed", "3"])
     folder = Path("studies/my scenario-2026-01-01")
-    text = cli._continue_command("identify", Path("my scenario.toml"), folder)
+    text = interrupted("my scenario.toml", None, folder)
     assert text == f"thsa-cosim identify 'my scenario.toml' --seed 3 -o '{folder}'"
     monkeypatch.setattr(sys, "argv", ["thsa-cosim", "identify", "s.toml", "-o", "here"])
-    assert (
-        cli._continue_command("identify", Path("s.toml"), Path("here"))
-        == "thsa-cosim identify s.toml -o here"
-    )
+    assert interrupted("s.toml", Path("here"), Path("here")) == "thsa-cosim identify s.toml -o here"
 
 
 def test_shell_completion_is_there() -> None:

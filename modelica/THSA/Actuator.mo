@@ -10,20 +10,45 @@ model Actuator "THSA in closed velocity loop, every loss a law over temperature"
   THSA.Interfaces.RealOutput u_q(unit="V", nominal=10) "Voltage of the q axis";
   THSA.Controllers.VelocityController velocityController "Velocity loop, the law to tune";
   THSA.Controllers.CurrentController currentController "Current loop";
-  THSA.Motor motor "Motor";
-  THSA.Gearbox gearbox "Gearbox";
+  THSA.Motor motor(du=inverterEffect.du, dT=windingEffect.dT, g_t=torqueEffect.g_t, g_e=torqueEffect.g_e,
+    tau_f=motorEffect.F) "Motor";
+  THSA.Gearbox gearbox(tau_f=gearboxEffect.F) "Gearbox";
   THSA.NoBack noBack "No-back device";
-  THSA.Screw screw "Roller screw";
-  THSA.Nut nut "Nut";
+  THSA.Screw screw(e=contactEffect.e, v_e=contactEffect.v_e) "Roller screw";
+  THSA.Nut nut(F_f=screwEffect.F) "Nut";
   THSA.Stabilizer stabilizer "Stabilizer";
   THSA.VelocitySensor sensor "Velocity sensor";
+  replaceable THSA.Effects.IdealInverter inverterEffect constrainedby THSA.Interfaces.VoltageEffect
+    "Slot: voltage of the inverter";
+  replaceable THSA.Effects.NoHeating windingEffect constrainedby THSA.Interfaces.HeatingEffect
+    "Slot: temperature of the winding";
+  replaceable THSA.Effects.ConstantTorqueConstant torqueEffect constrainedby THSA.Interfaces.TorqueConstantEffect
+    "Slot: torque constant";
+  replaceable THSA.Effects.NoFriction motorEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
+    constrainedby THSA.Interfaces.FrictionEffect
+    "Slot: friction and torques at the motor";
+  replaceable THSA.Effects.NoFriction gearboxEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
+    constrainedby THSA.Interfaces.FrictionEffect
+    "Slot: friction and torques at the gearbox's output shaft";
+  replaceable THSA.Effects.NoContact contactEffect constrainedby THSA.Interfaces.ContactEffect
+    "Slot: contact of screw and nut";
+  replaceable THSA.Effects.NoFriction screwEffect(v(unit="m/s"), z(unit="m"), N(unit="N"), F(unit="N"))
+    constrainedby THSA.Interfaces.FrictionEffect
+    "Slot: friction between screw and nut";
+  replaceable THSA.Effects.IdealSensor currentSensorEffect(u(unit="A"), d(unit="A"))
+    constrainedby THSA.Interfaces.SensorEffect
+    "Slot: sensor of the current [A], which the current loop uses";
+  replaceable THSA.Effects.IdealSensor velocitySensorEffect(u(unit="m/s"), d(unit="m/s"))
+    constrainedby THSA.Interfaces.SensorEffect
+    "Slot: sensor of the output velocity [m/s]";
 initial equation
   der(stabilizer.v) = 0;
 equation
   velocityController.reference = v_cmd*gearbox.i/screw.k;
   connect(motor.w_m, velocityController.measurement);
   connect(velocityController.y, currentController.reference);
-  connect(motor.i_q, currentController.measurement);
+  currentSensorEffect.u = motor.i_q;
+  currentController.measurement = motor.i_q + currentSensorEffect.d;
   connect(currentController.y, motor.u_q);
   connect(motor.flange, gearbox.flange_a);
   connect(gearbox.flange_b, noBack.flange_a);
@@ -35,11 +60,31 @@ equation
   connect(T_amb, motor.T);
   connect(T_amb, gearbox.T);
   connect(T_amb, nut.T);
-  connect(sensor.y, v);
+  velocitySensorEffect.u = sensor.y;
+  v = sensor.y + velocitySensorEffect.d;
   x = stabilizer.x;
   connect(motor.w_m, w_m);
-  connect(motor.i_q, i_q);
+  i_q = currentController.measurement;
   connect(currentController.y, u_q);
+  inverterEffect.i_q = motor.i_q;
+  windingEffect.P = motor.P_co;
+  torqueEffect.i_q = motor.i_q;
+  motorEffect.v = motor.w_m;
+  motorEffect.s = motor.friction.s;
+  motorEffect.z = motor.phi;
+  motorEffect.N = motor.tau_e;
+  gearboxEffect.v = gearbox.w_g;
+  gearboxEffect.s = gearbox.friction.s;
+  gearboxEffect.z = gearbox.flange_b.phi;
+  gearboxEffect.N = noBack.tau_s;
+  contactEffect.phi = screw.flange_a.phi;
+  contactEffect.w = noBack.w;
+  contactEffect.delta = screw.delta;
+  contactEffect.v_s = screw.v_s;
+  screwEffect.v = nut.v;
+  screwEffect.s = nut.friction.s;
+  screwEffect.z = stabilizer.x;
+  screwEffect.N = screw.F_s;
   annotation(
     experiment(StartTime=0, StopTime=1.2, Tolerance=1e-6, Interval=1e-3),
     Documentation(info="<html><p>The whole actuator. It starts at rest, in equilibrium under the load at the start, the

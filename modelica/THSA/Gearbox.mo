@@ -3,6 +3,7 @@ model Gearbox "Reduction gear with its losses at the output shaft"
   THSA.Interfaces.RotationalFlange flange_a "Shaft on the motor's side";
   THSA.Interfaces.RotationalFlange flange_b "Shaft on the screw's side";
   THSA.Interfaces.RealInput T(unit="degC") "Temperature of the lubricant";
+  input THSA.Units.Torque tau_f = 0 "Added friction torque at the output shaft";
   parameter THSA.Units.Ratio i(min=0.001, max=10000) = 30 "Gear ratio, motor to screw";
   THSA.TemperatureLaw T_fg(y(unit="N.m"),
     a0(unit="N.m", min=-1e4, max=1e4) = 11, a1(unit="N.m/K", min=-1000, max=1000) = -0.25,
@@ -26,8 +27,8 @@ equation
   flange_a.phi = i*flange_b.phi;
   w_g = der(flange_b.phi);
   friction.v = w_g;
-  0 = i*flange_a.tau + flange_b.tau - friction.F_f;
-  P_f = friction.F_f*w_g;
+  0 = i*flange_a.tau + flange_b.tau - friction.F_f - tau_f;
+  P_f = (friction.F_f + tau_f)*w_g;
   annotation(
     Documentation(info="<html><p>T_g = T_s + T_nb + T_fg sgn(&omega;_g) + b_g &omega;_g at the output shaft, T_g/i at
 the motor. The coefficients of the laws are those of table III.</p></html>"),

@@ -5,6 +5,11 @@ model Motor "Permanent-magnet synchronous motor in the power-invariant dq frame,
   THSA.Interfaces.RealOutput i_q(unit="A", start=0, fixed=true, nominal=10) "Current of the q axis";
   THSA.Interfaces.RealOutput w_m(unit="rad/s", start=0, fixed=true, nominal=10) "Speed of the rotor";
   THSA.Interfaces.RotationalFlange flange "Shaft";
+  input THSA.Units.Voltage du = 0 "Voltage that the inverter adds";
+  input Real dT(unit="K") = 0 "Temperature of the winding above T";
+  input THSA.Units.Ratio g_t = 0 "Relative change of the torque constant";
+  input THSA.Units.Ratio g_e = 0 "Relative change of the back-EMF constant";
+  input THSA.Units.Torque tau_f = 0 "Added friction torque";
   parameter THSA.Units.Ratio p(min=1, max=100) = 4 "Number of pole pairs";
   parameter THSA.Units.Inductance L(min=1e-6, max=1) = 2.0e-3 "Inductance of the q axis";
   parameter THSA.Units.Inertia J(min=1e-7, max=10) = 2.0e-3 "Moment of inertia of the rotor";
@@ -33,7 +38,7 @@ model Motor "Permanent-magnet synchronous motor in the power-invariant dq frame,
   THSA.Units.Power P_co "Copper loss";
   THSA.Units.Power P_f "Friction loss";
 equation
-  connect(T, R_s.T);
+  R_s.T = T + dT;
   connect(T, psi_pm.T);
   connect(T, T_fm.T);
   connect(T, b_m.T);
@@ -43,11 +48,11 @@ equation
   phi = flange.phi;
   w_m = der(phi);
   K_t = sqrt(3/2)*p*psi_pm.y;
-  L*der(i_q) = u_q - R_s.y*i_q - K_t*w_m;
-  tau_e = K_t*i_q;
-  J*der(w_m) = tau_e - friction.F_f + flange.tau;
+  L*der(i_q) = u_q + du - R_s.y*i_q - K_t*(1 + g_e)*w_m;
+  tau_e = K_t*(1 + g_t)*i_q;
+  J*der(w_m) = tau_e - friction.F_f - tau_f + flange.tau;
   P_co = R_s.y*i_q^2;
-  P_f = friction.F_f*w_m;
+  P_f = (friction.F_f + tau_f)*w_m;
   annotation(
     Documentation(info="<html>
 <p>L di_q/dt = u_q &minus; R_s i_q &minus; K_t &omega;_m, K_t = &radic;(3/2) p &psi;_pm (equation 4),

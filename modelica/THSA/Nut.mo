@@ -3,6 +3,7 @@ model Nut "Nut: friction of the screw against the housing"
   THSA.Interfaces.TranslationalFlange flange_a "Screw's side";
   THSA.Interfaces.TranslationalFlange flange_b "Output";
   THSA.Interfaces.RealInput T(unit="degC") "Temperature of the lubricant";
+  input THSA.Units.Force F_f = 0 "Added friction force";
   THSA.TemperatureLaw F_fn(y(unit="N"),
     a0(unit="N", min=-1e6, max=1e6) = 2.7e3, a1(unit="N/K", min=-1e5, max=1e5) = 37,
     a2(unit="N/K2", min=-1e4, max=1e4) = -1.4, a3(unit="N/K3", min=-1e3, max=1e3) = -0.07,
@@ -24,8 +25,8 @@ equation
   flange_a.s = flange_b.s;
   v = der(flange_b.s);
   friction.v = v;
-  flange_a.f + flange_b.f - friction.F_f = 0;
-  P_f = friction.F_f*v;
+  flange_a.f + flange_b.f - friction.F_f - F_f = 0;
+  P_f = (friction.F_f + F_f)*v;
   annotation(
     Documentation(info="<html><p>F_fn sgn(v) + b_n v between the two flanges. The coefficients of the laws are those of
 table III.</p></html>"),

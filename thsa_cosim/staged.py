@@ -64,8 +64,11 @@ def run_stages(
     workers: int = 1,
     cluster: str | None = None,
     on_progress: Callable[[Progress], None] | None = None,
+    command: str = "",
 ) -> StagedResult:
     """Run all stages, each in a folder of its own below ``folder``; a folder that exists is continued.
+
+    ``command``: the command line that repeats the study, to be kept with it.
 
     Raises
     ------
@@ -82,6 +85,12 @@ def run_stages(
             "fmu": [identity["fmu"] for identity in identities],
             "recordings": recordings,
             "seed": [identity["seed"] for identity in identities],
+        },
+        {
+            "title": staged.title or staged.path.stem,
+            "scenario": str(staged.path),
+            "command": command,
+            "stages": [stage.name for stage in staged.stages],
         },
     )
     finished: list[_Finished] = []

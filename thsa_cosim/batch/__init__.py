@@ -8,7 +8,7 @@
 """
 
 from thsa_cosim.batch.job import Experiment, Job, Reducer
-from thsa_cosim.batch.journal import Journal, JournalRow
+from thsa_cosim.batch.journal import Journal, JournalRow, JournalTable, read_journal
 from thsa_cosim.batch.local import LocalRunner
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.runner import Runner
@@ -18,9 +18,11 @@ __all__ = [
     "Job",
     "Journal",
     "JournalRow",
+    "JournalTable",
     "LocalRunner",
     "Outcome",
     "Reducer",
     "Runner",
     "Status",
+    "read_journal",
 ]

@@ -142,7 +142,7 @@ class Journal:
                 "choose another output folder."
             )
         for number, line in enumerate(lines[1:], start=2):
-            row = self._parse(line)
+            row = _parse(line, len(self.names), len(self.terms))
             if row is not None:
                 self._remember(row)
             elif number == len(lines):
@@ -153,28 +153,75 @@ class Journal:
             self._file.truncate(end)
             os.fsync(self._file.fileno())
 
-    def _parse(self, line: bytes) -> JournalRow | None:
-        try:
-            (cells,) = csv.reader([line.decode()], strict=True)
-            n, m = len(self.names), len(self.terms)
-            if len(cells) != n + m + 5:
-                return None
-            numbers = [float(cell) for cell in cells[2 : n + m + 3]]
-            return JournalRow(
-                stage=cells[0],
-                index=int(cells[1]),
-                values=tuple(numbers[:n]),
-                cost=numbers[n],
-                terms=tuple(numbers[n + 1 :]),
-                status=Status(cells[-2]),
-                reason=cells[-1],
-            )
-        except (ValueError, csv.Error):
-            return None
-
     def _remember(self, row: JournalRow) -> None:
         self._rows.append(row)
         self._known.setdefault((row.stage, row.values), row)
+
+
+@dataclass(frozen=True)
+class JournalTable:
+    """A journal as somebody else sees it: the parameters' and terms' names, and the whole rows so far."""
+
+    names: tuple[str, ...]
+    terms: tuple[str, ...]
+    rows: tuple[JournalRow, ...]
+    in_use: bool
+    """A study is writing it."""
+
+
+def read_journal(path: Path) -> JournalTable:
+    """Read a journal that another process may be writing; a torn last line is left out.
+
+    Raises InputError if the file is no journal.
+    """
+    with path.open("rb") as file:
+        in_use = _is_locked(file)
+        lines = file.read().split(b"\n")[:-1]
+    header = next(csv.reader([lines[0].decode("utf-8", "replace")]), []) if lines else []
+    costs = [k for k, name in enumerate(header) if name == "cost"]
+    if lines and (header[:2] != ["stage", "index"] or header[-2:] != ["status", "reason"] or not costs):
+        raise InputError(f"{path} is no journal of a study; delete it, or choose another folder.")
+    # Of columns with this name the last one is the cost: a parameter may be called so, a term is cost.<term>.
+    names, terms = header[2 : costs[-1]] if costs else [], header[costs[-1] + 1 : -2] if costs else []
+    parsed = (_parse(line, len(names), len(terms)) for line in lines[1:])
+    rows = tuple(row for row in parsed if row is not None)
+    return JournalTable(tuple(names), tuple(t.removeprefix("cost.") for t in terms), rows, in_use)
+
+
+def _is_locked(file: BinaryIO) -> bool:
+    """Whether another process holds the journal open for writing (where the system has flock)."""
+    try:
+        import fcntl
+    except ImportError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    fcntl.flock(file, fcntl.LOCK_UN)
+    return False
+
+
+def _parse(line: bytes, names: int, terms: int) -> JournalRow | None:
+    """A row of ``names`` values and ``terms`` cost terms; None if the line is none."""
+    try:
+        (cells,) = csv.reader([line.decode()], strict=True)
+        if len(cells) != names + terms + 5:
+            return None
+        numbers = [float(cell) for cell in cells[2 : names + terms + 3]]
+        return JournalRow(
+            stage=cells[0],
+            index=int(cells[1]),
+            values=tuple(numbers[:names]),
+            cost=numbers[names],
+            terms=tuple(numbers[names + 1 :]),
+            status=Status(cells[-2]),
+            reason=cells[-1],
+        )
+    except (ValueError, csv.Error):
+        return None
 
 
 def _cells(row: JournalRow) -> list[str]:

@@ -21,7 +21,7 @@ from thsa_cosim.identify.results import (
     Progress,
 )
 from thsa_cosim.identify.run import identify, study_identity
-from thsa_cosim.identify.study import open_study
+from thsa_cosim.identify.study import describe, open_study
 
 __all__ = [
     "ChannelError",
@@ -31,6 +31,7 @@ __all__ = [
     "LawResult",
     "PointResult",
     "Progress",
+    "describe",
     "identify",
     "open_study",
     "study_identity",

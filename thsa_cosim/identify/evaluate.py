@@ -77,6 +77,8 @@ class _Vector:
 
     point: int
     row: int
+    number: int
+    """Of the evaluation at its point: by it the generations can be told from the journal."""
     values: dict[str, float]
     missing: int
     outcomes: list[Outcome | None] = field(default_factory=list)
@@ -122,7 +124,9 @@ class Evaluator:
                 self.evaluations[k] += 1
                 if request.want is Want.TERMS and self._recall(k, row, named, replies[position]):
                     continue
-                vector = _Vector(k, row, named, len(point.cases), [None] * len(point.cases))
+                vector = _Vector(
+                    k, row, self.evaluations[k], named, len(point.cases), [None] * len(point.cases)
+                )
                 for c, case in enumerate(point.cases):
                     assigned = point.space.assignments(named, case.name)
                     if request.overrides:
@@ -249,7 +253,7 @@ class Evaluator:
         terms = reply.terms[row]
         return JournalRow(
             stage=self._points[vector.point].label,
-            index=self.evaluations[vector.point],
+            index=vector.number,
             values=self._columns(vector.values),
             cost=float(np.sum(terms)),
             terms=tuple(terms.tolist()),

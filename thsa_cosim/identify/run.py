@@ -18,7 +18,7 @@ from thsa_cosim.identify.parameter_set import parameter_set
 from thsa_cosim.identify.point import PointSearch, search_point
 from thsa_cosim.identify.problem import Case, Given, PointProblem, build_case, build_point
 from thsa_cosim.identify.results import Comparison, IdentifyResult, LawResult, PointResult, Progress
-from thsa_cosim.identify.study import open_study
+from thsa_cosim.identify.study import describe, open_study
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario, open_runner
 from thsa_cosim.search import EvolutionSettings, Generation
@@ -35,12 +35,14 @@ def identify(
     cluster: str | None = None,
     on_progress: OnProgress | None = None,
     given: Mapping[float | None, Given] | None = None,
+    command: str = "",
 ) -> IdentifyResult:
     """Identify the scenario's parameters in the study folder ``folder``; continue what it holds.
 
     A KeyboardInterrupt ends the study early: the result then has the status "interrupted" and the points
     that were finished. The same call continues it, and ends with what an undisturbed run would have found.
     ``given``: per temperature, how sure the start values are that earlier stages found; it widens the errors.
+    ``command``: the command line that repeats the study, to be kept with it.
 
     Raises
     ------
@@ -52,7 +54,8 @@ def identify(
     known = given or {}
     points = [build_point(scenario, p, known.get(p.temperature_degC)) for p in scenario.points]
     held_out = _held_out_cases(scenario)
-    open_study(folder, study_identity(scenario))
+    samples = {point.label: point.samples for point in points}
+    open_study(folder, study_identity(scenario), {**describe(scenario, command), "samples": samples})
     names = tuple(dict.fromkeys(name for point in points for name in point.space.names))
     channels = points[0].channel_names
     study = _Study(scenario, points, held_out)

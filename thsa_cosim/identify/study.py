@@ -1,10 +1,15 @@
 """The study folder: what makes two runs the same study, and the refusal to mix different ones."""
 
+import datetime
 import json
+import platform
 from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from thsa_cosim import __version__
 from thsa_cosim.errors import InputError
+from thsa_cosim.scenario import Scenario, TuneScenario
 
 MARKER = "study.json"
 
@@ -17,10 +22,45 @@ _WORDS = {
 }
 
 
-def open_study(folder: Path, identity: Mapping[str, object]) -> bool:
+#: Packages whose version may change a study's numbers.
+_PACKAGES = ("fmpy", "numba", "numpy", "pandas", "pint", "scipy")
+
+
+def describe(scenario: Scenario | TuneScenario, command: str) -> dict[str, object]:
+    """What a reader of an unfinished study wants to know: what was asked, where from, with which search.
+
+    ``command``: the command line that repeats it, empty for a study that a script runs.
+    """
+    return {
+        "title": scenario.title or scenario.path.stem,
+        "scenario": str(scenario.path),
+        "command": command,
+        "fmu": str(scenario.fmu.path),
+        "population": scenario.search.population,
+        "generations": scenario.search.generations,
+        "parameters": {p.name: p.unit for p in scenario.parameters.parameters},
+    }
+
+
+def _origin() -> dict[str, object]:
+    """When, where and with what a study began."""
+    versions = {"thsa-cosim": __version__, "Python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:  # a stripped installation; the study itself does not need to know
+            continue
+    now = datetime.datetime.now(datetime.UTC)
+    return {"started": now.isoformat(timespec="seconds"), "system": platform.platform(), "versions": versions}
+
+
+def open_study(
+    folder: Path, identity: Mapping[str, object], about: Mapping[str, object] | None = None
+) -> bool:
     """Create ``folder``, or check that it holds the same study; True if it is continued.
 
     ``identity`` maps the keys kind, scenario, fmu, recordings and seed to JSON values (digests, numbers).
+    ``about`` is kept beside it for readers and takes no part in the comparison.
     Raises InputError when the folder belongs to another study, holds something else, or cannot be written.
     """
     marker = folder / MARKER
@@ -31,8 +71,9 @@ def open_study(folder: Path, identity: Mapping[str, object]) -> bool:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(f"{folder} exists and is no study folder; choose an empty or new one with -o.")
         folder.mkdir(parents=True, exist_ok=True)
+        content = {**wanted, "about": {**(about or {}), **_origin()}}
         partial = marker.with_name(MARKER + ".part")
-        partial.write_text(json.dumps(wanted, indent=2) + "\n", encoding="utf-8")
+        partial.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
         partial.replace(marker)
     except OSError as error:
         reason = error.strerror or type(error).__name__

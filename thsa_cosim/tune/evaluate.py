@@ -66,6 +66,7 @@ class Evaluator:
         self._groups = groups
         self._on_progress = on_progress
         self._failed: Counter[str] = Counter()
+        self._asked: Counter[str] = Counter()
         self._runs = self._reused = self._generation = 0
         self._best: dict[str, float] = {}
 
@@ -90,8 +91,12 @@ class Evaluator:
         reasons = [[""] * len(r.values) for _, r in requests]
         jobs: list[Job] = []
         waiting: list[tuple[int, int, int]] = []
+        # Numbers of a group's evaluations: by them the generations can be told from the journal.
+        first: list[int] = []
         for position, (k, request) in enumerate(requests):
             group = self._groups[k]
+            first.append(self._asked[group.label] + 1)
+            self._asked[group.label] += len(request.values)
             for row, values in enumerate(request.values.tolist()):
                 self.evaluations += 1
                 known = self._journal.known(group.label, values)
@@ -118,7 +123,7 @@ class Evaluator:
             rows.append(
                 JournalRow(
                     stage=group.label,
-                    index=self.evaluations,
+                    index=first[position] + row,
                     values=tuple(request.values[row].tolist()),
                     cost=found.cost,
                     terms=tuple(found.worst.tolist()),

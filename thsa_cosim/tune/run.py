@@ -10,7 +10,7 @@ import numpy as np
 from thsa_cosim import __version__
 from thsa_cosim.batch import Journal
 from thsa_cosim.errors import StudyError
-from thsa_cosim.identify import Progress, open_study
+from thsa_cosim.identify import Progress, describe, open_study
 from thsa_cosim.identify.interleave import interleave
 from thsa_cosim.scenario import TuneScenario, open_runner
 from thsa_cosim.scenario.tune_model import combinations
@@ -50,11 +50,13 @@ def tune(
     workers: int = 1,
     cluster: str | None = None,
     on_progress: Callable[[Progress], None] | None = None,
+    command: str = "",
 ) -> TuneResult:
     """Tune the scenario's parameters in the study folder ``folder``; continue what it holds.
 
     A KeyboardInterrupt ends the study early: the result then has the status "interrupted". The same call
-    continues it, and ends with what an undisturbed run would have found.
+    continues it, and ends with what an undisturbed run would have found. ``command``: the command line that
+    repeats the study, to be kept with it.
 
     Raises
     ------
@@ -67,7 +69,7 @@ def tune(
     checked: Sequence[Case] = ()
     if scenario.schedule is not None:
         checked = build_cases(scenario, combinations(scenario.schedule.check), sampled=False)
-    open_study(folder, study_identity(scenario))
+    open_study(folder, study_identity(scenario), describe(scenario, command))
     names = Terms.of(scenario).names
     study = _Study(scenario, groups, Group("check", {}, tuple(checked), scenario.requirements), names)
     with Journal.open(folder / JOURNAL, scenario.parameters.names, names) as journal:

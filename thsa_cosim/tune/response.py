@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -171,7 +171,8 @@ def reducer(
         loop=None
         if loop is None
         else LoopTask(
-            scenario.fmu,
+            # A worker has a working directory of its own.
+            replace(scenario.fmu, path=scenario.fmu.path.resolve()),
             fixed,
             inputs,
             command.input,

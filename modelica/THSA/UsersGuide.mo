@@ -8,6 +8,7 @@ package UsersGuide "User's guide"
 <li><code>Benches</code>: motor, gearbox and screw alone, as they are tested in the low-temperature chamber.</li>
 <li>One class a component: <code>Motor</code>, <code>Gearbox</code>, <code>NoBack</code>, <code>Screw</code>,
 <code>Nut</code>, <code>Stabilizer</code>, <code>VelocitySensor</code> and the <code>Controllers</code>.</li>
+<li><code>Examples.EMPS</code>: another drive, of which public measurements exist.</li>
 </ul>
 <h4>Laws over temperature</h4>
 <p>A quantity that drifts with temperature is a <code>TemperatureLaw</code>: a cubic polynomial plus two

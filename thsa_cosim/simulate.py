@@ -65,6 +65,7 @@ class SimulateResult:
     failures: Mapping[str, int]
     """reason -> number of recordings"""
     files: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of result.json: plain JSON types."""
@@ -77,6 +78,7 @@ class SimulateResult:
             "failures": dict(self.failures),
             "fmu": {"path": str(self.scenario.fmu.path), "sha256": self.scenario.fmu.sha256},
             "version": __version__,
+            "notes": list(self.notes),
             "recordings": [
                 {
                     "name": r.name,
@@ -143,7 +145,7 @@ def simulate(
         raise StudyError(f"All {len(results)} simulations failed, {number} of them because {reason}.")
     folder.mkdir(parents=True, exist_ok=True)
     files = [_write_csv(folder, r) for r in results if r.simulated is not None]
-    result = SimulateResult(scenario, results, failures, (folder / RESULT, *files))
+    result = SimulateResult(scenario, results, failures, (folder / RESULT, *files), scenario.notes)
     partial = folder / f"{RESULT}.part"
     partial.write_text(json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     partial.replace(folder / RESULT)

@@ -171,7 +171,7 @@ class _Study:
             evaluations=0 if evaluator is None else sum(evaluator.evaluations),
             failures={} if evaluator is None else evaluator.failures,
             parameter_set=identified,
-            notes=(*failed, *notes, *left_out, *self._notes),
+            notes=(*scenario.notes, *failed, *notes, *left_out, *self._notes),
             settings={**asdict(scenario.search), "error": scenario.cost.error},
         )
 

@@ -12,6 +12,7 @@ import numpy as np
 from thsa_cosim.errors import RecordingError, ThsaCosimError, UnitError, did_you_mean
 from thsa_cosim.recordings.axis import TimeAxis, check_finite, common_grid, source_unit, times
 from thsa_cosim.recordings.noise import noise_estimate
+from thsa_cosim.recordings.piecewise import fit_piecewise_linear
 from thsa_cosim.recordings.table import Choose, RawColumn, resolve
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.units import convert
@@ -43,7 +44,10 @@ class Column:
     shift
         s; the signal is moved to later times by this much (negative: a sensor lag is taken out).
     smooth
-        ``"mean"`` replaces the signal by its mean.
+        ``"mean"`` replaces the signal by its mean, ``"piecewise-linear"`` by the continuous piecewise-linear
+        function with as few knots as its noise warrants (``piecewise``).
+    noise
+        1 σ of the white noise that ``"piecewise-linear"`` removes, in the FMU variable's unit; None: estimated.
     interpolation
         ``"linear"`` between samples, or ``"hold"``: the value stays until the next sample, as a digital
         command does.
@@ -55,7 +59,8 @@ class Column:
     scale: float = 1.0
     offset: float = 0.0
     shift: float = 0.0
-    smooth: Literal["none", "mean"] = "none"
+    smooth: Literal["none", "mean", "piecewise-linear"] = "none"
+    noise: float | None = None
     interpolation: Literal["linear", "hold"] = "linear"
 
 
@@ -70,6 +75,8 @@ class Recording:
     temperature_degC: float | None = None
     noise: Mapping[str, float] = field(default_factory=dict)
     """Estimated standard deviation of the white noise, in the FMU's unit; 0 where none can be seen."""
+    notes: tuple[str, ...] = ()
+    """What a reader of results should know: sentences."""
 
     @property
     def duration(self) -> float:
@@ -131,6 +138,7 @@ def read_recording(
     grid = common_grid(path, own, axis)
     values: dict[str, FloatArray] = {}
     noise: dict[str, float] = {}
+    notes: list[str] = []
     for signal, source in sources.items():
         if source.column is None:
             unit = source.unit or targets.get(signal) or "1"
@@ -147,6 +155,13 @@ def read_recording(
             numbers = _to_unit(path, signal, source, column.unit, targets.get(signal), numbers)
         check_finite(path, source.column, numbers, t, kept)
         noise[signal] = noise_estimate(numbers[kept])
+        if source.smooth == "piecewise-linear":
+            fit = fit_piecewise_linear(t[kept], numbers[kept], source.noise or noise[signal])
+            if fit.doubt:
+                notes.append(f"{path}: {signal} is used as measured, not piecewise linear: {fit.doubt}.")
+            else:
+                numbers = numbers.copy()
+                numbers[kept] = fit.at(t[kept])
         if source.smooth == "mean":
             values[signal] = np.full(grid.shape, float(np.mean(numbers[kept])))
         elif source.shift == 0.0 and np.array_equal(t[kept], grid):
@@ -160,7 +175,7 @@ def read_recording(
     held = frozenset(n for n in values if columns[n].interpolation == "hold")
     stamped = grid - grid[0] if axis.from_zero else grid
     signals = Signals(stamped, values, {n: targets.get(n) or columns[n].unit or "1" for n in values}, held)
-    return Recording(name or path.stem, path, sha256, signals, degrees, noise)
+    return Recording(name or path.stem, path, sha256, signals, degrees, noise, tuple(notes))
 
 
 _TEMPERATURE = "\0temperature"

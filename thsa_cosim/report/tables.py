@@ -107,6 +107,8 @@ def print_simulate(console: Console, result: SimulateResult) -> None:
     for recording in result.recordings:
         if recording.simulated is None:
             console.print(Text(f"{recording.name} failed: {recording.reason}"), highlight=False)
+    for note in result.notes:
+        console.print(Text(f"note: {note}"), highlight=False)
 
 
 def _error_cells(error: ChannelError | ChannelFit) -> tuple[str, str, str, str]:

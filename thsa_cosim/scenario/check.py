@@ -51,6 +51,10 @@ def roles(table: CommonTable, fmu: FmuDescription) -> tuple[tuple[str, ...], tup
         elif variable.causality in ("output", "local") and variable.type != "String":
             if column.column is None:
                 raise ScenarioError(f"{key} is an output, which cannot be a constant; name its column.")
+            if column.smooth == "piecewise-linear":
+                raise ScenarioError(
+                    f"{key}.smooth: {column.smooth!r} is for inputs; outputs are compared as measured."
+                )
             measured.append(name)
         else:
             raise ScenarioError(f"{key} is a {variable.causality} of {fmu.path.name}; set it in [fixed].")

@@ -122,6 +122,11 @@ class Scenario:
     zeroed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """FMU parameters that are 0 because of a parameter's ``zero`` or ``law_block``, by its name."""
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the recordings' reader has to say about them."""
+        return tuple(note for recording in (*self.fit, *self.validate) for note in recording.notes)
+
     def drive(self, recording: Recording) -> Signals:
         """Return the FMU's inputs of a recording."""
         return recording.signals.select(self.inputs)

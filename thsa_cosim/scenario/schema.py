@@ -72,7 +72,8 @@ class ColumnTable(Table):
     scale: Moderate = 1.0
     offset: Moderate = 0.0
     shift: Moderate = 0.0
-    smooth: Literal["none", "mean"] = "none"
+    smooth: Literal["none", "mean", "piecewise-linear"] = "none"
+    noise: Positive | None = None
     interpolation: Literal["linear", "hold"] = "linear"
 
     @model_validator(mode="after")
@@ -81,6 +82,15 @@ class ColumnTable(Table):
             raise PydanticCustomError("source", "needs either 'column' (of the file) or 'value' (a constant)")
         if self.scale == 0.0:
             raise PydanticCustomError("scale", "scale = 0 would erase the signal; use another number")
+        if self.smooth == "piecewise-linear" and self.interpolation == "hold":
+            raise PydanticCustomError(
+                "smooth", "smooth = 'piecewise-linear' runs between samples; leave out interpolation = 'hold'"
+            )
+        if self.noise is not None and self.smooth != "piecewise-linear":
+            raise PydanticCustomError(
+                "noise",
+                "'noise' goes with smooth = 'piecewise-linear'; a compared output's is [cost.channels]'s",
+            )
         return self
 
 

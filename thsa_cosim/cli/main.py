@@ -76,6 +76,8 @@ def run_command(arguments: list[str]) -> int:
     except OSError as error:
         where = f" ({error.filename})" if error.filename else ""
         return _fail(f"{error.strerror or error}{where}.", 2)
+    except MemoryError:
+        return _fail("the memory does not suffice: use shorter recordings, longer steps or fewer workers.", 3)
     except Exception as error:
         detail = " ".join(f"{type(error).__name__}: {error}".split())[:300]
         return _fail(f"internal fault, please report it: {detail} (THSA_COSIM_DEBUG=1 shows where).", 3)

@@ -25,6 +25,8 @@ def open_archive(path: Path) -> zipfile.ZipFile:
         raise FmuError(f"{path} does not exist; name an .fmu file.")
     if path.is_dir():
         raise FmuError(f"{path} is a folder; name an .fmu file.")
+    if not path.is_file():  # a pipe would wait for ever
+        raise FmuError(f"{path} is a pipe or device; name an .fmu file.")
     try:
         return zipfile.ZipFile(path)
     except (zipfile.BadZipFile, OSError) as error:

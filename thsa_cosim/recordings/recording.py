@@ -205,6 +205,8 @@ def _load(path: Path, choose: Choose) -> tuple[dict[str, RawColumn], str]:
     if suffix not in SUFFIXES:
         hint = did_you_mean(suffix, SUFFIXES) or f" Known endings: {', '.join(SUFFIXES)}."
         raise RecordingError(f"{path}: file ending {suffix!r} is not a known recording format.{hint}")
+    if path.exists() and not path.is_file():  # a pipe would wait for ever, a device has no end
+        raise RecordingError(f"{path}: cannot be read (it is a folder, pipe or device); name a file.")
     try:
         content = path.read_bytes()
     except FileNotFoundError:

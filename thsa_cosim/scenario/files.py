@@ -1,6 +1,7 @@
 """Which recordings a scenario or the command line means."""
 
 import glob
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,10 +20,10 @@ def expand(path: Path, key: str, own: Sequence[str], replaced_by: Sequence[Path 
     """
     folder, names = (Path(), [str(n) for n in replaced_by]) if replaced_by else (path.parent, list(own))
     option = f"--{key.rsplit('.', 1)[-1]}" if replaced_by else key
-    found: dict[Path, Path] = {}
+    found: dict[str, Path] = {}
     for name in names:
         for file in _matches(option, folder, name):
-            found.setdefault(file.resolve(), file)
+            found.setdefault(os.path.realpath(file), file)  # resolve() raises on loops of links
     return list(found.values())
 
 
@@ -53,7 +54,7 @@ def named(paths: Sequence[Path]) -> list[tuple[Path, str]]:
         if not repeated:
             break
         names = [
-            "/".join((*p.resolve().parts[-1 - depth : -1], p.stem)) if n in repeated else n
+            "/".join((*Path(os.path.realpath(p)).parts[-1 - depth : -1], p.stem)) if n in repeated else n
             for p, n in zip(paths, names, strict=True)
         ]
     return [(p, n if names.count(n) == 1 else str(p)) for p, n in zip(paths, names, strict=True)]

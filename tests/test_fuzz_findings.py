@@ -1,0 +1,75 @@
+"""What the fuzzer has found once, kept as tests of their own."""
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from thsa_cosim.cli import run_command
+
+ROOT = Path(__file__).parents[1]
+MOTOR = ROOT / "scenarios" / "motor.toml"
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links as POSIX has them")
+
+
+@pytest.mark.slow
+def test_tuning_finds_its_fmu_by_a_relative_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Margins are computed in worker processes, whose working directory is another.
+    text = (ROOT / "scenarios" / "table4.toml").read_text(encoding="utf-8")
+    for old, new in (
+        ("../fmus", "fmus"),
+        ("population = 45", "population = 5"),
+        ("generations = 30", "generations = 1"),
+        ("stop = 1.2", "stop = 0.6"),
+        ("[1.0, 1.2]", "[0.5, 0.6]"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "table4.toml").write_text(text[: text.index("[surface]")] + '[pareto]\nx = "effort"\n')
+    (tmp_path / "fmus").symlink_to(ROOT / "fmus")
+    monkeypatch.chdir(tmp_path)
+    code = run_command(["tune", "table4.toml", "-o", "study", "--workers", "1"])
+    errors = capsys.readouterr().err
+    assert code in (0, 3), errors  # five sets of gains need not keep every requirement
+    assert "usable response" not in errors
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (os.mkfifo, "it is a folder, pipe or device"),
+        (lambda path: path.symlink_to("/dev/zero"), "it is a folder, pipe or device"),
+        (lambda path: path.symlink_to(path), "symbolic link"),
+    ],
+    ids=["pipe", "endless", "loop"],
+)
+def test_a_recording_that_is_no_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], make: Callable[[Path], None], words: str
+) -> None:
+    path = tmp_path / "bench.csv"
+    make(path)
+    assert run_command(["identify", str(MOTOR), "--fit", str(path), "-o", str(tmp_path / "study")]) == 2
+    errors = capsys.readouterr().err
+    assert errors.count("\n") == 1
+    assert words in errors
+
+
+def test_an_fmu_that_is_a_pipe(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo(tmp_path / "pipe.fmu")
+    assert run_command(["check", str(tmp_path / "pipe.fmu")]) == 2
+    assert "is a pipe or device" in capsys.readouterr().err
+
+
+def test_memory_that_does_not_suffice_is_one_sentence(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def greedy(*_: object, **__: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("thsa_cosim.check.check_fmu", greedy)
+    assert run_command(["check", "any.fmu"]) == 3
+    assert capsys.readouterr().err.startswith("error: the memory does not suffice")

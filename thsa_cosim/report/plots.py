@@ -1,6 +1,5 @@
 """Figures of an identification, as PNG files; no global state of matplotlib is touched."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +13,6 @@ MEASURED = "0.55"
 SIMULATED = "#0b62a4"
 PUBLISHED = "#c44e2b"
 RESIDUAL = "#5b8c5a"
-
-
-def file_name(text: str) -> str:
-    """A name that is safe in any file system, from text that comes out of a user's file."""
-    return re.sub(r"[^\w.+-]+", "_", text).strip("._") or "unnamed"
 
 
 def plot_law(law: LawResult, result: IdentifyResult, path: Path) -> None:

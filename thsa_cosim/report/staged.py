@@ -9,7 +9,7 @@ from rich.console import Console
 from thsa_cosim import __version__
 from thsa_cosim.report.parameter_files import write_parameter_set
 from thsa_cosim.report.result_json import identify_to_dict, write_json
-from thsa_cosim.report.study import RESULT, write_identify
+from thsa_cosim.report.study import RESULT, write_identify, write_simulate
 from thsa_cosim.report.tables import print_identify, print_simulate
 from thsa_cosim.staged import StagedResult
 
@@ -55,7 +55,7 @@ def write_staged(result: StagedResult, folder: Path) -> list[Path]:
         if stage.name in result.identified:
             written += write_identify(result.identified[stage.name], folder / f"{number}_{stage.name}")
         elif stage.name in result.simulated:
-            written += result.simulated[stage.name].files
+            written += write_simulate(result.simulated[stage.name], folder / f"{number}_{stage.name}")
     if result.parameter_set.values:
         written += write_parameter_set(folder, result.parameter_set)
     write_json(folder / RESULT, staged_to_dict(result))

@@ -11,6 +11,8 @@ from thsa_cosim.report.result_json import (
     write_laws_csv,
     write_parameters_csv,
 )
+from thsa_cosim.report.signal_files import file_name, write_signals
+from thsa_cosim.simulate import SimulateResult
 
 RESULT = "result.json"
 
@@ -18,10 +20,10 @@ RESULT = "result.json"
 def write_identify(
     result: IdentifyResult, folder: Path, on_file: Callable[[Path], None] | None = None
 ) -> list[Path]:
-    """Write result.json, parameters.csv, laws.csv and the plots; return what was written, in order."""
+    """Write result.json, parameters.csv, laws.csv, the signals and the plots; return what was written, in order."""
     # matplotlib takes half a second to import: not before the study has run.
     from thsa_cosim.report.friction import write_friction
-    from thsa_cosim.report.plots import file_name, plot_comparison, plot_convergence, plot_law, plot_laws
+    from thsa_cosim.report.plots import plot_comparison, plot_convergence, plot_law, plot_laws
 
     written: list[Path] = []
 
@@ -55,9 +57,22 @@ def write_identify(
         for path in write_friction(folder, result.laws, min(temperatures), max(temperatures)):
             note(path)
     for comparison in result.comparisons:
+        both = {"measured": comparison.measured, "simulated": comparison.simulated}
+        note(write_signals(folder, comparison.role, comparison.recording, both))
         path = plots / f"{comparison.role}_{file_name(comparison.recording)}.png"
         plot_comparison(comparison, path)
         note(path)
     plot_convergence(result, plots / "convergence.png")
     note(plots / "convergence.png")
+    return written
+
+
+def write_simulate(result: SimulateResult, folder: Path) -> list[Path]:
+    """Write the signals of a simulate study, whose result.json and CSV files are there; return all its files."""
+    written = list(result.files)
+    for recording in result.recordings:
+        if recording.simulated is not None:
+            simulated = recording.simulated.select(recording.measured.names)
+            both = {"measured": recording.measured, "simulated": simulated}
+            written.append(write_signals(folder, recording.role, recording.name, both))
     return written

@@ -47,6 +47,13 @@ def tune_to_dict(result: TuneResult) -> dict[str, Any]:
         "surface": _surface(result.surface),
         "schedule": _schedule_rows(result),
         "schedule_check": _check(result.schedule),
+        "command": {
+            "output": scenario.command.output,
+            "unit": scenario.cost.unit,
+            "input": scenario.command.input,
+        },
+        "conditions": {axis.name: {"unit": axis.unit, "values": list(axis.values)} for axis in scenario.axes},
+        "term_units": term_units(result),
         "groups": [
             {
                 "label": group.label,
@@ -87,6 +94,20 @@ def _scored(scored: Scored | None, result: TuneResult) -> dict[str, Any] | None:
         "feasible": scored.feasible,
         "excess": dict(scored.excess),
     }
+
+
+def term_units(result: TuneResult) -> dict[str, str]:
+    """The unit of every term of the cost and the requirements."""
+    scenario = result.scenario
+    unit = scenario.cost.unit
+    units = {"tracking": f"({unit})²", "rise_time": "s", "settling_time": "s", "tracking_error": unit}
+    units |= {"steady_state_error": "1", "overshoot": "1", "gain_margin": "dB", "phase_margin": "deg"}
+    units |= {"bandwidth": "Hz"}
+    for name in result.terms:
+        signal = scenario.metrics.effort if name == "effort" else name.partition(".")[2]
+        if name not in units and signal:
+            units[name] = scenario.fmu.variables[signal].unit or "1"
+    return units
 
 
 def condition_key(name: str, unit: str) -> str:

@@ -9,9 +9,11 @@ from rich.text import Text
 
 from thsa_cosim.report.result_json import write_json
 from thsa_cosim.report.schedule_files import write_schedule
+from thsa_cosim.report.signal_files import write_signals
 from thsa_cosim.report.study import RESULT
 from thsa_cosim.report.tables import number
-from thsa_cosim.report.tune_json import tune_to_dict, write_check_csv, write_pareto_csv
+from thsa_cosim.report.tune_json import term_units, tune_to_dict, write_check_csv, write_pareto_csv
+from thsa_cosim.signals import Signals
 from thsa_cosim.tune import ScheduleCheck, Scored, TuneResult
 
 
@@ -30,6 +32,8 @@ def write_tune(result: TuneResult, folder: Path, on_file: Callable[[Path], None]
     write_json(folder / RESULT, tune_to_dict(result))
     note(folder / RESULT)
     plots = folder / "plots"
+    for path in write_responses(result, folder):
+        note(path)
     if result.after is not None:
         tune_plots.plot_responses(result, plots / "responses.png")
         note(plots / "responses.png")
@@ -56,6 +60,34 @@ def write_tune(result: TuneResult, folder: Path, on_file: Callable[[Path], None]
                 tune_plots.plot_check(result.schedule, result, plots / "schedule_check.png")
                 note(plots / "schedule_check.png")
     return written
+
+
+def write_responses(result: TuneResult, folder: Path) -> list[Path]:
+    """Write command and responses under every condition: the commanded output in the cost's unit, others in theirs."""
+    scenario = result.scenario
+    command, unit = scenario.command, scenario.cost.unit
+    others = [n for n in (scenario.metrics.effort, *(r.signal for r in scenario.requirements)) if n]
+    units = {axis.name: axis.unit for axis in scenario.axes}
+    written: dict[str, Path] = {}
+    for k, condition in enumerate(result.conditions):
+        label = ", ".join(f"{n} = {v:g} {units[n]}" for n, v in condition.items()) or "response"
+        if label in written:  # the same condition with a sample of uncertain parameters
+            continue
+        variants = {
+            "command": Signals(
+                command.time, {command.output: command.values / scenario.cost.scale}, {command.output: unit}
+            )
+        }
+        for scored in (result.before, *result.compare, result.after):
+            signals = None if scored is None or k >= len(scored.signals) else scored.signals[k]
+            if scored is not None and signals is not None:
+                shown = signals.select(
+                    [command.output, *dict.fromkeys(n for n in others if n != command.output)]
+                )
+                response = shown[command.output] * command.factor / scenario.cost.scale
+                variants[scored.name] = shown.with_values({command.output: response}, {command.output: unit})
+        written[label] = write_signals(folder, "response", label, variants)
+    return list(written.values())
 
 
 def print_tune(console: Console, result: TuneResult) -> None:
@@ -94,7 +126,7 @@ def _sets_table(title: str, sets: list[Scored], result: TuneResult) -> Table:
         cells = ["varies" if s.name == "schedule" else number(s.gains[parameter.name]) for s in sets]
         table.add_row(Text(f"{parameter.name} [{parameter.unit}]"), *cells, "")
     table.add_row("cost (equation 7)", *(number(s.eq7) for s in sets), "", style="bold")
-    units = _units(result)
+    units = term_units(result)
     limits = {r.name: ("≤ " if r.upper else "≥ ") + number(r.limit) for r in result.scenario.requirements}
     for name in result.terms:
         cells = [number(s.worst[name]) + ("" if s.excess.get(name, 0.0) <= 0.0 else " !") for s in sets]
@@ -121,16 +153,3 @@ def _schedule_table(result: TuneResult) -> Table:
 def _check_table(result: TuneResult, check: ScheduleCheck) -> Table:
     title = f"Sweep between the nodes: worst of {len(check.conditions)} conditions"
     return _sets_table(title, list(check.sets), result)
-
-
-def _units(result: TuneResult) -> dict[str, str]:
-    scenario = result.scenario
-    unit = scenario.cost.unit
-    units = {"tracking": f"({unit})²", "rise_time": "s", "settling_time": "s", "tracking_error": unit}
-    units |= {"steady_state_error": "1", "overshoot": "1", "gain_margin": "dB", "phase_margin": "deg"}
-    units |= {"bandwidth": "Hz"}
-    for name in result.terms:
-        signal = scenario.metrics.effort if name == "effort" else name.partition(".")[2]
-        if name not in units and signal:
-            units[name] = scenario.fmu.variables[signal].unit or "1"
-    return units

@@ -1,0 +1,293 @@
+"""The page's first section: what was asked, what came out, how sure that is."""
+
+from thsa_cosim.report.page.comparison import MET, MISSED, noise_ratio, ratio_mark
+from thsa_cosim.report.page.content import Block, Cell, Column, Facts, Section, Table, Text
+from thsa_cosim.report.page.failures import evaluations, failed
+from thsa_cosim.report.page.folder import Json, Part, Study
+from thsa_cosim.report.page.text import (
+    count,
+    degrees,
+    listing,
+    number_cell,
+    percent,
+    plus_minus,
+    quantity,
+    text_cell,
+)
+from thsa_cosim.report.tables import number
+
+_STATUS = {
+    "running": "The study is running; this is how far it is. The same command writes the page anew.",
+    "stopped": "The study was stopped before its end and nothing is running; what is done is kept.",
+    "interrupted": "The study was interrupted; these are the results of what was finished by then.",
+}
+
+
+def summary(study: Study, diagnosed: tuple[Block, ...] = ()) -> Section:
+    """The section for any kind of study; ``diagnosed`` is what a diagnosis has to say first."""
+    blocks: list[Block] = []
+    status = study.status
+    if status in _STATUS:
+        command = study.whole.about.get("command")
+        again = f" Continue with: {command}" if command and status != "running" else ""
+        blocks.append(Text(_STATUS[status] + again, "bad" if status == "stopped" else ""))
+    blocks.append(Facts([("asked", text) for text in _asked(study)]))
+    blocks += diagnosed
+    for part in study.parts:
+        if part.result is None:
+            blocks.append(Text(f"{part.title}: {_so_far(part)}"))
+    result = study.whole.result
+    if result is not None:
+        if result.get("points"):
+            blocks.append(_found_table(result))
+        if study.whole.kind == "tune":
+            blocks += _tuned(result)
+        errors = _errors(study)
+        if errors is not None:
+            blocks.append(errors)
+    sure = [*_sure(study)]
+    if sure:
+        blocks.append(Facts([("how sure", text) for text in sure]))
+    blocks += [Text(f"Note: {note}") for note in _notes(study)]
+    return Section("summary", "Summary", tuple(blocks))
+
+
+def _asked(study: Study) -> list[str]:
+    return [text for part in study.parts if (text := _question(part))]
+
+
+def _question(part: Part) -> str:
+    """One sentence on what a part was to find."""
+    result, about = part.result or {}, part.about
+    fmu = (
+        str((result.get("fmu") or {}).get("path") or about.get("fmu", "the FMU"))
+        .replace("\\", "/")
+        .rsplit("/", 1)[-1]
+    )
+    names = list(about.get("parameters", {}))
+    search = f"differential evolution, {part.population} vectors, at most {part.generations} generations"
+    if part.kind == "identify":
+        points = result.get("points", [])
+        names = list(dict.fromkeys(n for p in points for n in p["parameters"])) or names
+        at = [p["temperature_degC"] for p in points if p["temperature_degC"] is not None]
+        where = (
+            f" at {count(len(at), 'temperature')} ({degrees(min(at))} to {degrees(max(at))})" if at else ""
+        )
+        fitted = [r for r in result.get("recordings", []) if r["role"] == "fit"]
+        held = len(result.get("recordings", [])) - len(fitted)
+        data = (
+            f" from {count(len(fitted), 'recording')}" + (f", {held} held out" if held else "")
+            if fitted
+            else ""
+        )
+        return f"Find {listing(names)} of {fmu}{where}{data}; {search}."
+    if part.kind == "simulate":
+        recordings = result.get("recordings", [])
+        return f"Simulate {fmu} with {count(len(recordings), 'recording')} and compare." if recordings else ""
+    if part.kind == "tune":
+        conditions = [
+            f"{name} = {', '.join(number(v) for v in axis['values'])} {axis['unit']}"
+            for name, axis in result.get("conditions", {}).items()
+        ]
+        names = list(result.get("units", {})) or names
+        where = f" under {listing(conditions)}" if conditions else ""
+        return f"Find {listing(names)} of {fmu}{where} by equation 7 with its requirements; {search}."
+    return ""
+
+
+def _so_far(part: Part) -> str:
+    done, broken = evaluations(part), sum(failed(part).values())
+    stages = len({row.stage for row in part.journal.rows}) if part.journal else 0
+    of = ""
+    if part.population and part.generations and stages:
+        searches = len(part.about.get("samples", {})) or stages
+        of = f" of at most {searches * part.population * (part.generations + 1)}"
+    return f"{count(done, 'vector')} evaluated{of} in {count(stages, 'search', 'searches')}, {broken} failed so far."
+
+
+def _found_table(result: Json) -> Table:
+    """Each parameter at its coldest and warmest point, with its law."""
+    points: list[Json] = result["points"]
+    laws: Json = result.get("laws", {})
+    names = list(dict.fromkeys(n for p in points for n in p["parameters"]))
+    columns = [Column("parameter", numeric=False), Column("unit", numeric=False)]
+    several = len(points) > 1
+    columns += (
+        [Column("coldest"), Column("value there"), Column("warmest"), Column("there")]
+        if several
+        else [Column("value")]
+    )
+    if laws:
+        columns += [Column("law", numeric=False), Column("points from published")]
+    rows = []
+    for name in names:
+        own = [p for p in points if name in p["parameters"]]
+        row = [text_cell(name), text_cell(own[0]["parameters"][name]["unit"])]
+        for point in (own[0], own[-1]) if several else own:
+            estimate = point["parameters"][name]
+            if several:
+                row.append(Cell(degrees(point["temperature_degC"]), point["temperature_degC"]))
+            mark = "" if estimate["identifiable"] else "bad"
+            row.append(Cell(plus_minus(estimate["value"], estimate["stderr"]), estimate["value"], mark))
+        if laws:
+            law = laws.get(name, {})
+            away = (law.get("largest_deviation") or {}).get("points")
+            row += [text_cell(law.get("form", "–")), Cell(percent(away), away)]
+        rows.append(row)
+    note = "Red: not determined by the data." if any(c.mark == "bad" for r in rows for c in r) else ""
+    return Table("What came out: values ± one standard error", columns, rows, note)
+
+
+def _tuned(result: Json) -> list[Block]:
+    after, before = result.get("after"), result.get("before")
+    if not after:
+        return [Text("No gains were found.", "bad")]
+    units: Json = result.get("units", {})
+    found = listing([f"{name} = {quantity(v, units.get(name, ''))}" for name, v in after["gains"].items()])
+    requirements = result.get("requirements", [])
+    met = [r for r in requirements if r.get("met")]
+    feasible = bool(result.get("feasible"))
+    kept = (
+        f"{len(met)} of {count(len(requirements), 'requirement')} are met"
+        if requirements
+        else "none were required"
+    )
+    blocks: list[Block] = [Text(f"Found: {found}; {kept}.", "good" if feasible else "bad")]
+    terms = [n for n in ("rise_time", "steady_state_error", "overshoot", "settling_time") if n in after]
+    if before:
+        term_units: Json = result.get("term_units", {})
+        columns = (
+            Column("quantity", numeric=False),
+            Column("unit", numeric=False),
+            Column("before"),
+            Column("after"),
+        )
+        rows = [
+            (
+                text_cell(n),
+                text_cell(u),
+                number_cell(before["gains"].get(n)),
+                number_cell(after["gains"].get(n)),
+            )
+            for n, u in units.items()
+        ]
+        rows.append(
+            (
+                text_cell("cost (equation 7)"),
+                text_cell("1"),
+                number_cell(before["cost"]),
+                number_cell(after["cost"]),
+            )
+        )
+        rows += [
+            (
+                text_cell(n.replace("_", " ")),
+                text_cell(term_units.get(n, "")),
+                number_cell(before.get(n)),
+                number_cell(after[n]),
+            )
+            for n in terms
+        ]
+        blocks.append(Table("What came out", columns, rows))
+    return blocks
+
+
+def _errors(study: Study) -> Table | None:
+    """Rmse against noise per role and channel over the whole study."""
+    rows = []
+    for role, name, error in _all_errors(study):
+        ratio = noise_ratio(error)
+        share = error.get("nrmse")
+        cells = (number_cell(error["rmse"], 3), number_cell(error.get("noise"), 3))
+        rows.append(
+            (
+                text_cell({"fit": "fitted", "validate": "held out"}.get(role, role)),
+                text_cell(name),
+                text_cell(error["unit"]),
+                *cells,
+                number_cell(ratio, 3, ratio_mark(ratio)),
+                Cell(percent(share), share),
+            )
+        )
+    if not rows:
+        return None
+    columns = (
+        Column("recordings", numeric=False),
+        Column("signal", numeric=False),
+        Column("unit", numeric=False),
+        Column("rmse"),
+        Column("noise (1 σ)"),
+        Column("rmse / noise"),
+        Column("rmse / range"),
+    )
+    return Table("How well the recordings are met", columns, rows)
+
+
+def _all_errors(study: Study) -> list[tuple[str, str, Json]]:
+    result = study.whole.result or {}
+    found = [(role, n, e) for role, channels in result.get("error", {}).items() for n, e in channels.items()]
+    if found or study.whole.kind != "simulate":
+        return found
+    worst: dict[tuple[str, str], Json] = {}
+    for recording in result.get("recordings", []):
+        for name, error in recording["error"].items():
+            key = recording["role"], name
+            if key not in worst or error["rmse"] > worst[key]["rmse"]:
+                worst[key] = error
+    return [(f"{role}, worst" if role else "worst", name, error) for (role, name), error in worst.items()]
+
+
+def _sure(study: Study) -> list[str]:
+    """Sentences on how far the numbers can be trusted."""
+    result = study.whole.result
+    if result is None:
+        return []
+    sentences = []
+    values = [(n, p, e) for p in result.get("points", []) for n, e in p["parameters"].items()]
+    if values:
+        sentences.append(_determined(values))
+    ratios = [
+        (f"{name} ({role})", r) for role, name, e in _all_errors(study) if (r := noise_ratio(e)) is not None
+    ]
+    if ratios:
+        name, worst = max(ratios, key=lambda item: item[1])
+        what = f"The largest error is {number(worst, 3)} × the sensor's noise, in {name}"
+        if worst <= MET:
+            sentences.append(f"{what}: the model explains these recordings down to the noise.")
+        elif worst <= MISSED:
+            sentences.append(f"{what}: a little is left that the model does not explain.")
+        else:
+            sentences.append(f"{what}: the model lacks something, and the errors given are then too small.")
+    done = sum(evaluations(part) for part in study.parts)
+    broken = sum(sum(failed(part).values()) for part in study.parts)
+    if done:
+        sentences.append(f"{count(done, 'evaluation')}, {broken or 'none'} failed.")
+    return sentences
+
+
+def _determined(values: list[tuple[str, Json, Json]]) -> str:
+    unsure = [f"{n} at {degrees(p['temperature_degC'])}" for n, p, e in values if not e["identifiable"]]
+    shares = [
+        (e["stderr"] / abs(e["value"]), f"{n} at {degrees(p['temperature_degC'])}")
+        for n, p, e in values
+        if e["identifiable"] and e["stderr"] and e["value"]
+    ]
+    widest = (
+        f"; the least certain of the others is {max(shares)[1]}, ± {percent(max(shares)[0])}"
+        if shares
+        else ""
+    )
+    if unsure:
+        share = f"{len(unsure)} of {count(len(values), 'value')}"
+        return f"{share} are not determined by the data: {listing(unsure)}{widest}."
+    widest = f"; the least certain is {max(shares)[1]}, ± {percent(max(shares)[0])}" if shares else ""
+    return (
+        f"The data determine {'the one value' if len(values) == 1 else f'all {len(values)} values'}{widest}."
+    )
+
+
+def _notes(study: Study) -> list[str]:
+    notes = [str(note) for note in (study.whole.result or {}).get("notes", [])]
+    if study.in_stages:
+        notes += [f"{p.name}: {note}" for p in study.parts for note in (p.result or {}).get("notes", [])]
+    return list(dict.fromkeys(notes))

@@ -1,0 +1,142 @@
+"""A study folder → one HTML file that needs nothing else: style, script, plotly and data are inside."""
+
+import base64
+import hashlib
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from thsa_cosim import __version__
+from thsa_cosim.errors import InputError
+from thsa_cosim.report.page.comparison import comparison
+from thsa_cosim.report.page.content import Block, Figure, Fold, Section
+from thsa_cosim.report.page.convergence import convergence
+from thsa_cosim.report.page.correlation import correlation
+from thsa_cosim.report.page.failures import failures
+from thsa_cosim.report.page.folder import Part, Study, read_study
+from thsa_cosim.report.page.friction import friction
+from thsa_cosim.report.page.gains import gains
+from thsa_cosim.report.page.parameters import parameters
+from thsa_cosim.report.page.pareto import pareto
+from thsa_cosim.report.page.plane import plane
+from thsa_cosim.report.page.provenance import provenance
+from thsa_cosim.report.page.responses import responses
+from thsa_cosim.report.page.schedule import schedule
+from thsa_cosim.report.page.summary import summary
+
+PAGE = "report.html"
+
+SectionOf = Callable[[Part], Section | None]
+
+#: Sections of a part by kind of study, in the order of the page.
+SECTIONS: dict[str, tuple[SectionOf, ...]] = {
+    "identify": (comparison, convergence, correlation),
+    "simulate": (comparison,),
+    "tune": (gains, responses, plane, schedule, pareto, convergence),
+}
+
+
+def write_page(folder: Path, output: Path | None = None) -> Path:
+    """Write the page of the study in ``folder``, finished or running; return its path.
+
+    ``output``: the file to write; default ``report.html`` in the folder.
+
+    Raises
+    ------
+    InputError
+        If the folder is no study, a file in it is damaged, or the page cannot be written.
+    """
+    study = read_study(folder)
+    target = output or folder / PAGE
+    html = render(study, sections(study))
+    partial = target.with_name(f"{target.name}.{os.getpid()}.part")
+    try:
+        partial.write_text(html, encoding="utf-8", errors="replace")
+        partial.replace(target)
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise InputError(
+            f"The page {target} cannot be written ({reason}); choose another file with -o."
+        ) from None
+    finally:
+        partial.unlink(missing_ok=True)
+    return target
+
+
+def sections(study: Study) -> list[Section]:
+    """All sections of a study's page that have something to show.
+
+    Raises InputError if the result does not have the form that this version writes.
+    """
+    try:
+        return list(_sections(study))
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        what = " ".join(f"{type(error).__name__}: {error}".split())[:120]
+        raise InputError(
+            f"{study.whole.folder} holds a result that this version cannot read ({what}); "
+            "repeat the study's command to write it anew."
+        ) from error
+
+
+def _sections(study: Study) -> list[Section]:
+    found: list[Section | None] = [summary(study)]
+    if study.whole.result is not None:
+        found += [parameters(study.whole.result), friction(study.whole.result)]
+    for part in study.parts:
+        own = [section for build in SECTIONS.get(part.kind, ()) if (section := build(part)) is not None]
+        if study.in_stages and own:
+            found.append(Section(f"{part.prefix}part", part.title, (), is_part=True))
+        found += own
+    found += [failures(study.parts), provenance(study)]
+    return [section for section in found if section is not None]
+
+
+def render(study: Study, shown: list[Section]) -> str:
+    """The sections as one HTML document; what comes from files is escaped by the templates."""
+    environment = Environment(
+        loader=PackageLoader("thsa_cosim.report.page"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    scripts = [get_plotlyjs(), _template("page.js")]
+    return environment.get_template("page.html").render(
+        study=study,
+        sections=shown,
+        figures={f.name: _figure_data(f) for section in shown for f in _figures(section.blocks)},
+        style=Markup(_template("page.css")),
+        scripts=[Markup(text) for text in scripts],
+        # Only these scripts may run, and nothing may be fetched: a name that slipped through could do nothing.
+        script_digests=[_digest(text) for text in scripts],
+        version=__version__,
+    )
+
+
+def _figure_data(figure: Figure) -> dict[str, object]:
+    content = asdict(figure)
+    return {"data": content["data"], "layout": content["layout"]}
+
+
+def _figures(blocks: Sequence[Block]) -> list[Figure]:
+    found: list[Figure] = []
+    for block in blocks:
+        if isinstance(block, Figure):
+            found.append(block)
+        elif isinstance(block, Fold):
+            found += _figures(block.blocks)
+    return found
+
+
+def _template(name: str) -> str:
+    return (Path(__file__).parent / "templates" / name).read_text(encoding="utf-8")
+
+
+def _digest(script: str) -> str:
+    """A script's digest as the Content Security Policy wants it."""
+    return "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")

@@ -111,7 +111,11 @@ def load_dependent_friction(random: Random, rig: Rig) -> Draft:
     """Friction that grows with the force it carries: of the rolling contact, or of the gear mesh."""
     if random.random() < 0.5:
         return Draft(
-            "load-dependent-friction", "nut", lambda a: {"load_nut": 0.01 * a}, 15.0, _one("load_nut", "1")
+            "load-dependent-friction",
+            "nut",
+            lambda a: {"load_nut": 0.01 * a},
+            15.0,
+            _one("load_nut", "1", "mu", "factor", "load"),
         )
     return Draft("load-dependent-friction", "gear mesh", lambda a: {"load_gear": 0.01 * a}, 15.0)
 
@@ -214,7 +218,7 @@ def windage(random: Random, rig: Rig) -> Draft:
         f"|w|^{exponent:g}",
         lambda a: {"windage": 0.02 * a, "windage_exponent": exponent},
         20.0,
-        (lambda fields: (Coefficient(fields["windage"] * 1e-4, "N.m/(rad/s)2", ()),))
+        (lambda fields: (Coefficient(fields["windage"] * 1e-4, "N.m.s2/rad2", ()),))
         if exponent == 2.0
         else lambda fields: (),
     )

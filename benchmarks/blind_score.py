@@ -1,0 +1,243 @@
+"""Scores of the blind benchmark: a unit's label against its result.json, and what all of them reach.
+
+Names count as in the contract: what follows a colon is a location, `equivalent` names of the first effect are a
+tie that these data allow, and more than two of them are no answer. The noise floor is the sensors' own.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from pathlib import Path
+from typing import Any
+
+from blind_units import EFFECTS, FLOOR
+from scipy.stats import binomtest
+
+from thsa_cosim.errors import ThsaCosimError
+from thsa_cosim.units import convert
+
+NONE, UNEXPLAINED, FAILED = "no-missing-effect", "unexplained-structure", "no result"
+MOST_TIES = 2
+HELD_OUT = 1.1  # goal: rmse over the noise floor
+
+
+@dataclass(frozen=True)
+class Reported:
+    """One effect of a result.json."""
+
+    name: str
+    ties: tuple[str, ...]
+    parameters: Mapping[str, Mapping[str, Any]]
+
+    def covers(self, truth: str) -> bool:
+        return truth == self.name or (truth in self.ties and len(self.ties) <= MOST_TIES)
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a diagnosis made of one unit."""
+
+    unit: str
+    kind: str  # "single", "pair", "outside" or "clean"
+    truth: tuple[str, ...]
+    forms: tuple[str, ...]
+    strength: str
+    verdict: str
+    names: tuple[str, ...]
+    first: str  # what the confusion matrix counts: the truth, where the first name or its ties have it
+    right: bool
+    alone: bool  # right, and nothing else named
+    held_out: float | None  # largest rmse over noise floor on the validate recordings, after
+    covered: tuple[bool, ...]  # true coefficients inside their 95 % intervals
+    seconds: float | None
+
+    @property
+    def quiet(self) -> bool:
+        return self.verdict == NONE
+
+    @property
+    def flagged(self) -> bool:
+        return self.verdict == UNEXPLAINED
+
+
+def score(
+    unit: str, label: Mapping[str, Any], result: Mapping[str, Any] | None, seconds: float | None
+) -> Score:
+    """`label` as blind.py writes it; `result` is None where the diagnosis failed."""
+    truth = tuple(effect["name"] for effect in label["effects"])
+    reported = [_reported(entry) for entry in (result or {}).get("effects", [])]
+    verdict = FAILED if result is None else str(result["verdict"])
+    pairing = _pairing(truth, reported)
+    kind = label["kind"]
+    if kind == "clean":
+        right = verdict == NONE
+    elif kind == "outside":
+        right = verdict == UNEXPLAINED
+    elif kind == "single":
+        right = bool(reported) and reported[0].covers(truth[0])
+    else:
+        right = len(pairing) == len(truth)
+    first = reported[0].name if reported else verdict
+    if reported:
+        first = next((name for name in truth if reported[0].covers(name)), first)
+    return Score(
+        unit=unit,
+        kind=kind,
+        truth=truth,
+        forms=tuple(effect["form"] for effect in label["effects"]),
+        strength=label["strength"],
+        verdict=verdict,
+        names=tuple(effect.name for effect in reported),
+        first=first,
+        right=right,
+        alone=right and len(reported) == len(truth if kind in ("single", "pair") else ()),
+        held_out=None if result is None else _held_out(result),
+        covered=tuple(
+            inside
+            for effect in label["effects"]
+            if effect["name"] in pairing and pairing[effect["name"]].name == effect["name"]
+            for inside in _covered(effect["coefficients"], pairing[effect["name"]].parameters)
+        ),
+        seconds=seconds,
+    )
+
+
+def _reported(entry: Mapping[str, Any]) -> Reported:
+    ties = tuple(str(name).split(":")[0] for name in entry.get("equivalent", []))
+    return Reported(str(entry["name"]).split(":")[0], ties, entry.get("parameters", {}))
+
+
+def _pairing(truth: Sequence[str], reported: Sequence[Reported]) -> dict[str, Reported]:
+    """The reported effect of each true one, no reported effect twice; as many as can be."""
+    best: dict[str, Reported] = {}
+    spots: list[Reported | None] = [*reported, *[None] * len(truth)]
+    for chosen in permutations(spots, len(truth)):
+        found = {
+            name: effect for name, effect in zip(truth, chosen, strict=True) if effect and effect.covers(name)
+        }
+        best = max(best, found, key=len)
+    return best
+
+
+def _held_out(result: Mapping[str, Any]) -> float | None:
+    """Largest rmse over the floor of the channels after, or before where nothing was added."""
+    after = result.get("after", {}).get("validate") or result.get("before", {}).get("validate") or {}
+    ratios = [channel["rmse"] / FLOOR[name] for name, channel in after.items() if name in FLOOR]
+    return max(ratios, default=None)
+
+
+def _covered(coefficients: Iterable[Mapping[str, Any]], found: Mapping[str, Mapping[str, Any]]) -> list[bool]:
+    """For every true coefficient with exactly one comparable estimate: is it inside value +- 1.96 stderr?
+
+    Comparable is what has the same dimension and, where that leaves a choice, a name that holds a known word.
+    """
+    inside = []
+    for true in coefficients:
+        same = {
+            name: entry for name, entry in found.items() if _converted(1.0, entry, true["unit"]) is not None
+        }
+        if len(same) > 1:
+            same = {n: e for n, e in same.items() if any(word in n.lower() for word in true["words"])}
+        if len(same) != 1 or (entry := next(iter(same.values()))).get("stderr") is None:
+            continue
+        value, stderr = (_converted(entry[key], entry, true["unit"]) for key in ("value", "stderr"))
+        assert value is not None
+        assert stderr is not None
+        # a gain may be given as a factor or as its error
+        wanted = true["value"] - 1.0 if "gain" in true["words"] and abs(value) < 0.5 else true["value"]
+        inside.append(abs(value - wanted) <= 1.96 * stderr)
+    return inside
+
+
+def _converted(value: float, entry: Mapping[str, Any], unit: str) -> float | None:
+    try:
+        return float(convert(value, str(entry.get("unit", "1")), unit))
+    except ThsaCosimError:
+        return None
+
+
+# -- all units together -------------------------------------------------------------------------------------
+def summary(scores: Sequence[Score]) -> str:
+    """The goals of the benchmark and what was reached, the confusion matrix, and every unit that went wrong."""
+    by_kind = {kind: [s for s in scores if s.kind == kind] for kind in ("single", "pair", "outside", "clean")}
+    named = by_kind["single"] + by_kind["pair"] + by_kind["clean"]
+    measured = [s.held_out for s in named if s.held_out is not None]
+    lines = [
+        f"{len(scores)} units: " + ", ".join(f"{len(found)} {kind}" for kind, found in by_kind.items()),
+        "",
+        "goal                                            reached          95 % interval",
+        _goal("right class first", ">= 95 %", by_kind["single"], lambda s: s.right),
+        _goal("  ... and no other named", "", by_kind["single"], lambda s: s.alone),
+        _goal("false alarms on clean units", "<= 2 %", by_kind["clean"], lambda s: not s.quiet),
+        _goal("  ... that name an effect", "", by_kind["clean"], lambda s: bool(s.names)),
+        _goal("outside effects flagged", ">= 90 %", by_kind["outside"], lambda s: s.flagged),
+        _goal("both of two", ">= 90 %", by_kind["pair"], lambda s: s.right),
+        _goal("  ... and no third named", "", by_kind["pair"], lambda s: s.alone),
+        _goal(f"held-out error <= {HELD_OUT} x floor", "all", measured, lambda ratio: ratio <= HELD_OUT),
+        _goal("coefficient in its interval", ">= 90 %", [c for s in scores for c in s.covered], bool),
+    ]
+    seconds = sorted(s.seconds for s in scores if s.seconds is not None)
+    if seconds:
+        lines.append(
+            f"time of a unit: median {seconds[len(seconds) // 2]:.0f} s, longest {seconds[-1]:.0f} s"
+        )
+    lines += ["", "right class first, by strength"]
+    for strength in ("weak", "medium", "strong"):
+        lines.append(
+            _goal(
+                f"  {strength}",
+                "",
+                [s for s in by_kind["single"] if s.strength == strength],
+                lambda s: s.right,
+            )
+        )
+    lines += ["", *_confusion(scores), "", "units that went wrong"]
+    lines += [
+        f"  {s.unit} {s.strength:6s} {' + '.join(s.truth) or 'clean'} ({'; '.join(s.forms)}) -> "
+        f"{s.verdict} {', '.join(s.names)}"
+        for s in scores
+        if not s.right
+    ]
+    return "\n".join(lines)
+
+
+def _goal(text: str, goal: str, cases: Sequence[Any], holds: Callable[[Any], bool]) -> str:
+    if not cases:
+        return f"{text:36s} {goal:8s}    no case"
+    count = sum(map(holds, cases))
+    interval = binomtest(count, len(cases)).proportion_ci(method="exact")
+    share, low, high = (100.0 * value for value in (count / len(cases), interval.low, interval.high))
+    return f"{text:36s} {goal:8s} {count:4d} of {len(cases):4d} {share:5.1f} %   {low:5.1f} .. {high:5.1f} %"
+
+
+def _confusion(scores: Sequence[Score]) -> list[str]:
+    """Rows: truth (pairs left out). Columns: what was named first, a tie with the truth counted as the truth."""
+    table: dict[str, Counter[str]] = defaultdict(Counter)
+    for s in scores:
+        if s.kind != "pair":
+            table[s.truth[0] if s.truth else "clean"][s.first] += 1
+    rows = [name for name in [*EFFECTS, "clean"] if name in table]
+    met = {first for row in table.values() for first in row}
+    known = [name for name in [*EFFECTS, NONE, UNEXPLAINED, FAILED] if name in met]
+    columns = known + sorted(met - set(known))
+    letters = [chr(ord("A") + j) for j in range(len(columns))]
+    lines = [
+        "confusion: truth by what was named first",
+        " " * 28 + "".join(f"{letter:>4s}" for letter in letters),
+    ]
+    for name in rows:
+        counts = (table[name][column] for column in columns)
+        lines.append(f"{name:28s}" + "".join(f"{count or '.':>4}" for count in counts))
+    return lines + [f"  {letter} {column}" for letter, column in zip(letters, columns, strict=True)]
+
+
+def read_score(unit: str, label: Path, study: Path) -> Score:
+    """The score of a unit whose diagnosis has ended."""
+    found = study / "result.json"
+    run = json.loads((study.parent / f"{unit}.json").read_text())
+    result = json.loads(found.read_text()) if found.exists() and run["exit_code"] == 0 else None
+    return score(unit, json.loads(label.read_text()), result, run["seconds"])

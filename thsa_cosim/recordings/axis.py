@@ -17,7 +17,8 @@ class TimeAxis:
     """How time is read, cut and resampled.
 
     ``column`` None takes the file's own time axis (TDMS waveforms, MF4). ``start`` and ``stop`` [s] cut in the
-    file's time; the first kept sample becomes time 0 if ``from_zero``. ``step`` [s] resamples linearly.
+    file's time; the cut begins ``lead_in`` s earlier as far as the file goes. The first kept sample becomes time 0
+    if ``from_zero``. ``step`` [s] resamples linearly.
     """
 
     column: str | None = None
@@ -26,6 +27,7 @@ class TimeAxis:
     stop: float | None = None
     step: float | None = None
     from_zero: bool = True
+    lead_in: float = 0.0
 
 
 def times(path: Path, asked: str, raw: Mapping[str, RawColumn], axis: TimeAxis) -> FloatArray:
@@ -73,7 +75,7 @@ def common_grid(path: Path, own: Mapping[str, FloatArray], axis: TimeAxis) -> Fl
     finest = max(own.values(), key=lambda t: t.size / (t[-1] - t[0]))
     low = max(float(t[0]) for t in own.values())
     high = min(float(t[-1]) for t in own.values())
-    low = low if axis.start is None else max(low, axis.start)
+    low = low if axis.start is None else max(low, axis.start - axis.lead_in)
     high = high if axis.stop is None else min(high, axis.stop)
     grid = finest[(finest >= low) & (finest <= high)]
     if grid.size < 2:

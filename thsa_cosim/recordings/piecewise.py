@@ -29,7 +29,7 @@ _SAMPLES_PER_KNOT = 10
 _LEAST = 4
 """Samples that a segment needs for a line of its own."""
 _SPREAD, _COLOUR = 1.3, 0.25
-"""Largest residual (in noise) and autocorrelation; structure of half the noise is left at either of them."""
+"""Largest residual, in noise, and autocovariance, in its square: structure of half the noise is left then."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +106,25 @@ class _Search:
             if right - left > 2 * _LEAST:
                 # Else a signal of many periods would be taken apart one by one, from its ends.
                 found.append(0.5 * (place + (left if place - left > right - place else right)))
-        return self._use(np.union1d(self.spline.knots, np.array(found)))
+        return self._use(np.union1d(self._apart_from(np.sort(found)), found))
 
     def _use(self, knots: FloatArray) -> bool:
-        """Take other knots; True if their number has changed."""
-        before = self.spline.knots.size
+        """Take these knots; True if they are others."""
+        changed = not np.array_equal(knots, self.spline.knots)
         self.spline = LinearSpline(self.t, self.y, knots)
-        return knots.size != before
+        return changed
+
+    def _apart_from(self, places: FloatArray) -> FloatArray:
+        """Return the knots without those within half a sample of ``places`` (sorted): two would be one too many."""
+        knots = self.spline.knots
+        if places.size == 0:
+            return knots
+        next_ = np.minimum(np.searchsorted(places, knots), places.size - 1)
+        apart = (
+            np.minimum(np.abs(places[next_] - knots), np.abs(knots - places[np.maximum(next_ - 1, 0)])) > 0.5
+        )
+        apart[[0, -1]] = True
+        return np.asarray(knots[apart])
 
     def _hinge(self, first: int, last: int) -> float | None:
         """Return the time of the hinge that the residual of samples first..last-1 warrants, if any."""
@@ -227,11 +239,9 @@ class _Search:
         if spread > _SPREAD + 4.0 / np.sqrt(2.0 * size):
             return f"what is left is {spread:.2f} times its noise"
         lags = range(1, min(10, size // 4) + 1)
-        colour = max(
-            (abs(float(residual[k:] @ residual[:-k])) / self.spline.squares for k in lags), default=0.0
-        )
+        colour = max((abs(float(residual[k:] @ residual[:-k])) / size for k in lags), default=0.0)
         if colour > _COLOUR + 4.0 / np.sqrt(size):
-            return f"what is left is not white (autocorrelation {colour:.2f})"
+            return f"what is left is not white (autocovariance {colour:.2f} in units of its noise)"
         return ""
 
 

@@ -77,11 +77,20 @@ class Recording:
     """Estimated standard deviation of the white noise, in the FMU's unit; 0 where none can be seen."""
     notes: tuple[str, ...] = ()
     """What a reader of results should know: sentences."""
+    lead_in: float = 0.0
+    """s at the beginning that only bring a model into the right state: they drive it and are not compared."""
 
     @property
     def duration(self) -> float:
         """Length in s."""
         return float(self.signals.time[-1] - self.signals.time[0])
+
+    @property
+    def compared(self) -> Signals:
+        """The signals after the lead-in."""
+        # Times are sums and differences of rounded numbers: a sample at the border belongs to what follows.
+        first = self.signals.time[0] + self.lead_in * (1.0 - 1e-9) - 1e-12
+        return self.signals.window(first) if self.lead_in > 0.0 else self.signals
 
 
 def column_names(path: Path | str) -> tuple[str, ...]:
@@ -121,8 +130,8 @@ def read_recording(
     Raises
     ------
     RecordingError
-        If the file is missing, unreadable or empty, a column is unknown, not numeric or not finite, or time
-        does not increase.
+        If the file is missing, unreadable or empty, a column is unknown, not numeric or not finite, time
+        does not increase, or nothing is left after the lead-in.
     UnitError
         If a unit is unknown, missing, or contradicts the file or the FMU.
     MissingExtraError
@@ -136,6 +145,11 @@ def read_recording(
     targets: dict[str, str | None] = {**(units or {}), _TEMPERATURE: "degC"}
     own = {s.column: times(path, s.column, raw, axis) for s in sources.values() if s.column is not None}
     grid = common_grid(path, own, axis)
+    if axis.lead_in >= grid[-1] - grid[0]:
+        raise RecordingError(
+            f"{path}: a lead-in of {axis.lead_in:g} s leaves nothing of {grid[-1] - grid[0]:g} s to compare;"
+            f" shorten it."
+        )
     values: dict[str, FloatArray] = {}
     noise: dict[str, float] = {}
     notes: list[str] = []
@@ -175,7 +189,7 @@ def read_recording(
     held = frozenset(n for n in values if columns[n].interpolation == "hold")
     stamped = grid - grid[0] if axis.from_zero else grid
     signals = Signals(stamped, values, {n: targets.get(n) or columns[n].unit or "1" for n in values}, held)
-    return Recording(name or path.stem, path, sha256, signals, degrees, noise, tuple(notes))
+    return Recording(name or path.stem, path, sha256, signals, degrees, noise, tuple(notes), axis.lead_in)
 
 
 _TEMPERATURE = "\0temperature"

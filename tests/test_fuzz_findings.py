@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from fuzzing.material import motor, samples
+from small_scenario import toml
 
 from thsa_cosim.cli import run_command
 
@@ -73,3 +75,18 @@ def test_memory_that_does_not_suffice_is_one_sentence(
     monkeypatch.setattr("thsa_cosim.check.check_fmu", greedy)
     assert run_command(["check", "any.fmu"]) == 3
     assert capsys.readouterr().err.startswith("error: the memory does not suffice")
+
+
+@pytest.mark.slow
+def test_a_cost_without_a_finite_value_names_its_channel(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frame = samples("motor_m30")
+    frame["q_current_A"] *= 1e-322  # noise that squares to 0
+    frame.to_csv(tmp_path / "tiny.csv", index=False)
+    scenario = tmp_path / "motor.toml"
+    scenario.write_text(toml(motor()), encoding="utf-8")
+    (tmp_path / "Motor.fmu").symlink_to(ROOT / "fmus" / "Motor.fmu")
+    arguments = ["identify", str(scenario), "--fit", str(tmp_path / "tiny.csv"), "--workers", "1"]
+    assert run_command([*arguments, "-o", str(tmp_path / "study")]) == 3
+    assert "the cost of i_q is not finite" in capsys.readouterr().err

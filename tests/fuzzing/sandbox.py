@@ -142,6 +142,8 @@ def _exit_findings(code: int | None, output: str, errors: str) -> Iterator[str]:
             "error: "
         ):
             yield f"no single sentence on stderr: {errors[-300:]!r}"
+        elif sentences[-1].endswith(":"):
+            yield f"a sentence without an end: {sentences[-1][-300:]!r}"
         elif len(sentences[-1]) > LONGEST_SENTENCE:
             yield f"a sentence of {len(sentences[-1])} characters"
 

@@ -59,6 +59,11 @@ def search_point(
         last_reason = next((reason for reason in reply.reasons if reason), last_reason)
         totals = np.asarray(np.sum(reply.terms, axis=1))
         if first and not np.isfinite(totals).any():
+            # Simulations that succeeded, against recordings or noise of an absurd size.
+            endless = [
+                c for c, t in zip(point.channel_names, reply.terms.T, strict=True) if np.isinf(t).all()
+            ]
+            last_reason = last_reason or f"the cost of {' and '.join(endless)} is not finite"
             raise _HopelessError
         first = False
         return totals

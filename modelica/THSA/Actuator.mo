@@ -42,7 +42,7 @@ model Actuator "THSA in closed velocity loop, every loss a law over temperature"
     constrainedby THSA.Interfaces.SensorEffect
     "Slot: sensor of the output velocity [m/s]";
 initial equation
-  der(stabilizer.v) = 0;
+  stabilizer.x = -F_load/screw.k_s;
 equation
   velocityController.reference = v_cmd*gearbox.i/screw.k;
   connect(motor.w_m, velocityController.measurement);

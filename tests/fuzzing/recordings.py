@@ -15,15 +15,15 @@ def write_mutated(rng: Random, folder: Path, frame: pd.DataFrame) -> Path:
     """Write a mutated recording under ``folder`` and return its path."""
     ending = rng.choice(tuple(WRITERS))
     path = folder / f"bench{ending}"
-    way = rng.randrange(8)
+    way = rng.randrange(12)
     if way == 0:
         return _strange_file(rng, folder, path)
     try:
-        write_recording(path, mutate_samples(rng, frame) if way < 4 else frame)
+        write_recording(path, mutate_samples(rng, frame) if way < 8 else frame)
     except Exception:  # this format cannot hold such samples: the file's bytes are mutated instead
         write_recording(path, frame)
-        way = 7
-    if way >= 4:
+        way = 11
+    if way >= 8:
         content = path.read_bytes()
         if ending in (".csv", ".txt", ".lvm") and rng.random() < 0.7:
             separator = {".csv": ",", ".txt": ";", ".lvm": "\t"}[ending]
@@ -49,7 +49,7 @@ def mutate_samples(rng: Random, frame: pd.DataFrame) -> pd.DataFrame:
         k = rng.randrange(changed.shape[1])
         name = changed.columns[k]
         rows = np.array([rng.random() < 0.02 for _ in range(len(changed))])
-        match rng.randrange(14):
+        match rng.randrange(22):  # from 14 on: what a bench may well record
             case 0:
                 changed.isetitem(k, changed.iloc[:, k].where(~rows, np.nan))
             case 1:
@@ -81,6 +81,20 @@ def mutate_samples(rng: Random, frame: pd.DataFrame) -> pd.DataFrame:
             case 13:
                 stamps = pd.Timestamp("2026-01-31") + pd.to_timedelta(np.arange(len(changed)), unit="ms")
                 changed.isetitem(k, stamps)
+            case 14 | 15:
+                changed = changed[[rng.random() < 0.8 for _ in range(len(changed))]]
+            case 16 | 17:
+                changed.isetitem(k, changed.iloc[:, k].to_numpy() * rng.choice((0.1, 0.9, 1.1, 10.0, 1000.0)))
+            case 18:
+                changed.isetitem(k, np.round(changed.iloc[:, k].to_numpy(), rng.choice((0, 1, -1))))
+            case 19:
+                changed.isetitem(k, np.clip(changed.iloc[:, k].to_numpy(), -0.1, 0.1))
+            case 20:
+                noise = [rng.gauss(0.0, 1.0) for _ in range(len(changed))]
+                changed.isetitem(k, changed.iloc[:, k].to_numpy() + np.array(noise))
+            case 21:
+                jitter = [1e-4 * rng.random() for _ in range(len(changed))]
+                changed.isetitem(0, changed.iloc[:, 0].to_numpy() + np.array(jitter))
     return changed
 
 

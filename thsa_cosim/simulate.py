@@ -192,6 +192,7 @@ def _compare(scenario: Scenario, recording: Recording, role: str, outcome: Outco
     errors: dict[str, ChannelFit] = {}
     if outcome.signals is not None:
         reached = measured.time <= outcome.signals.time[-1] * (1.0 + 1e-12) + 1e-9
+        reached &= measured.time >= recording.compared.time[0]
         samples = measured.time[reached]
         at_samples = outcome.signals.select(measured.names).resample(samples)
         for name in measured.names:

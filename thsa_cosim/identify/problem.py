@@ -20,7 +20,7 @@ from thsa_cosim.signals import FloatArray, Signals
 class Case:
     """One recording as a simulation: ``inputs`` drive the FMU over ``time`` (n,) in s.
 
-    ``channels`` are fitted, within the cost's window; ``measured`` holds all samples of those signals.
+    ``channels`` are fitted, within the cost's window; ``measured`` holds all samples after the lead-in.
     ``fixed``: start values that every run has, in the FMU's units.
     """
 
@@ -115,9 +115,10 @@ def build_case(scenario: Scenario, recording: Recording, fixed: Mapping[str, flo
             )
         grid = time[0] + step * np.arange(count)
     counted = _counted(scenario, time) & (time <= grid[-1] + 1e-9 * abs(grid[-1]))
+    counted &= time >= recording.compared.time[0]
     if np.count_nonzero(counted) < 2:
         raise ScenarioError(
-            f"{scenario.path}: cost.window and cost.mask leave no sample of {recording.path}; widen them."
+            f"{scenario.path}: cost.window and cost.mask leave no sample of {recording.name}; widen them."
         )
     channels = tuple(
         Channel(
@@ -136,7 +137,7 @@ def build_case(scenario: Scenario, recording: Recording, fixed: Mapping[str, flo
         time=grid,
         fixed=fixed,
         channels=channels,
-        measured=recording.signals.select(scenario.measured),
+        measured=recording.compared.select(scenario.measured),
         temperature_degC=recording.temperature_degC,
         tolerance=scenario.simulation.tolerance,
     )

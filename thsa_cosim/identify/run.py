@@ -231,6 +231,7 @@ def _digest(recording: Recording) -> str:
     for name in signals.names:
         digest.update(name.encode())
         digest.update(signals[name].tobytes())
+    digest.update(str(recording.lead_in).encode())
     return digest.hexdigest()
 
 

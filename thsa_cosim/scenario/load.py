@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -129,8 +130,8 @@ def _resolve(
             f"{min(both)} is both a fit and a validate recording; remove it from one of them."
         )
     if not files["fit"] and not (isinstance(table, SimulateTable) and files["validate"]):
-        raise ScenarioError("recordings.fit names no recording; add one.")
-    read = {role: _recordings(table, paths, description) for role, paths in files.items()}
+        raise ScenarioError("recordings.fit names no recording; add one, or give it with --fit.")
+    read = _recordings(table, files, description, parts_held_out=not validate)
     per_recording = [p.name for p, where in parameters if where == "recording"]
     scenario = Scenario(
         kind=table.kind,
@@ -161,19 +162,37 @@ def _resolve(
 
 
 def _recordings(
-    table: CommonTable, paths: Sequence[Path], description: FmuDescription
-) -> tuple[Recording, ...]:
+    table: CommonTable,
+    files: Mapping[str, Sequence[Path]],
+    description: FmuDescription,
+    *,
+    parts_held_out: bool,
+) -> dict[str, tuple[Recording, ...]]:
+    """Read the files of each role; parts cut the fit files, ``parts_held_out``: into both roles."""
     columns = {name: Column(**column.model_dump()) for name, column in table.recordings.columns.items()}
     units = {name: description.variables[name].unit or None for name in columns}
     source = table.temperature
     temperature: str | Column | None = None
     if source is not None:
         temperature = source.input or Column(column=source.column, unit=source.unit)
-    axis = TimeAxis(**table.recordings.time.model_dump())
-    return tuple(
-        read_recording(path, columns, time=axis, units=units, temperature=temperature, name=name)
-        for path, name in named(paths)
-    )
+    whole = TimeAxis(**table.recordings.time.model_dump())
+    found: dict[str, list[Recording]] = {"fit": [], "validate": []}
+
+    def read(role: str, path: Path, axis: TimeAxis, name: str) -> None:
+        found[role].append(
+            read_recording(path, columns, time=axis, units=units, temperature=temperature, name=name)
+        )
+
+    for role, paths in files.items():
+        for path, name in named(paths):
+            if role == "fit" and table.recordings.parts:
+                for part in table.recordings.parts:
+                    if part.use == "fit" or parts_held_out:
+                        axis = replace(whole, start=part.start, stop=part.stop)
+                        read(part.use, path, axis, f"{name} {part.name}")
+            else:
+                read(role, path, whole, name)
+    return {role: tuple(recordings) for role, recordings in found.items()}
 
 
 def _points(

@@ -3,6 +3,7 @@
 A further kind of scenario is one more class in ``KINDS``.
 """
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -46,6 +47,11 @@ class Table(BaseModel):
         return tuple(field.alias or name for name, field in cls.model_fields.items())
 
 
+def _check_order(start: float | None, stop: float | None) -> None:
+    if start is not None and stop is not None and not start < stop:
+        raise PydanticCustomError("order", "start must lie before stop")
+
+
 class TimeTable(Table):
     """``[recordings.time]``."""
 
@@ -55,11 +61,11 @@ class TimeTable(Table):
     stop: float | None = None
     step: Positive | None = None
     from_zero: bool = True
+    lead_in: NotNegative = 0.0
 
     @model_validator(mode="after")
     def _order(self) -> "TimeTable":
-        if self.start is not None and self.stop is not None and not self.start < self.stop:
-            raise PydanticCustomError("order", "start must lie before stop")
+        _check_order(self.start, self.stop)
         return self
 
 
@@ -94,13 +100,56 @@ class ColumnTable(Table):
         return self
 
 
+class PartTable(Table):
+    """``[[recordings.parts]]``: a piece of every fit file, in s of the file's time."""
+
+    name: Name
+    use: Literal["fit", "validate"]
+    start: float | None = None
+    stop: float | None = None
+
+    @model_validator(mode="after")
+    def _order(self) -> "PartTable":
+        _check_order(self.start, self.stop)
+        return self
+
+    def overlaps(self, other: "PartTable") -> bool:
+        """Whether the two pieces share samples."""
+        begin = max(-math.inf if p.start is None else p.start for p in (self, other))
+        return begin < min(math.inf if p.stop is None else p.stop for p in (self, other))
+
+
 class RecordingsTable(Table):
     """``[recordings]``."""
 
     fit: list[Name] = []
     validate_: list[Name] = Field(default=[], alias="validate")
     time: TimeTable = TimeTable()
+    parts: list[PartTable] = []
     columns: dict[Name, ColumnTable] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _apart(self) -> "RecordingsTable":
+        if self.parts and not (self.time.start is None and self.time.stop is None):
+            raise PydanticCustomError(
+                "parts", "time.start and time.stop cut whole files; cut in parts or there"
+            )
+        if self.parts and all(p.use == "validate" for p in self.parts):
+            raise PydanticCustomError("parts", "no entry of parts has use = 'fit'; add one")
+        for k, part in enumerate(self.parts):
+            for other in self.parts[:k]:
+                names = {"one": repr(other.name), "other": repr(part.name)}
+                if part.name == other.name:
+                    raise PydanticCustomError(
+                        "parts", "two entries of parts are named {one}; rename one", names
+                    )
+                if part.use != other.use and part.overlaps(other):
+                    raise PydanticCustomError(
+                        "parts",
+                        "parts {one} and {other} overlap, but only one is fitted; move a bound",
+                        names,
+                    )
+        return self
 
 
 class TemperatureTable(Table):
@@ -197,8 +246,7 @@ class WindowTable(Table):
 
     @model_validator(mode="after")
     def _order(self) -> "WindowTable":
-        if self.start is not None and self.stop is not None and not self.start < self.stop:
-            raise PydanticCustomError("order", "start must lie before stop")
+        _check_order(self.start, self.stop)
         return self
 
 

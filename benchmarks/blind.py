@@ -61,7 +61,7 @@ class Unit:
 def plan(seed: int) -> list[Unit]:
     """All units, in an order of which every beginning is balanced."""
     random = np.random.default_rng(seed)
-    kinds = {
+    kinds: dict[str, list[tuple[tuple[str, ...], str]]] = {
         "single": list(_rounds([(name,) for name in CATALOGUE], random)),
         "outside": list(_rounds([(name,) for name in OUTSIDE], random)),
         "pair": _pairs(random),

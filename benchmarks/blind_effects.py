@@ -55,11 +55,11 @@ def _signed(field: str, unit: str, *words: str) -> Callable[[Fields], tuple[Coef
     return lambda fields: (Coefficient(fields[field], unit, words),)
 
 
-def _log(random: Random, low: float, high: float) -> float:
+def log_uniform(random: Random, low: float, high: float) -> float:
     return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
-def _way(random: Random) -> float:
+def either_way(random: Random) -> float:
     return float(random.choice([-1.0, 1.0]))
 
 
@@ -68,7 +68,7 @@ def stribeck(random: Random, rig: Rig) -> Draft:
     exponent = float(random.choice([1.0, 2.0, 0.0]))
     form = {1.0: "exponential", 2.0: "gaussian", 0.0: "hess-soom"}[exponent]
     if random.random() < 0.5:
-        speed = _log(random, 3e-4, 2e-3)
+        speed = log_uniform(random, 3e-4, 2e-3)
         return Draft(
             "stribeck",
             f"nut, {form}",
@@ -80,7 +80,7 @@ def stribeck(random: Random, rig: Rig) -> Draft:
             most=4.0,
             coefficients=_one("stribeck_nut_speed", "m/s") if exponent else lambda fields: (),
         )
-    speed = _log(random, 5.0, 30.0)
+    speed = log_uniform(random, 5.0, 30.0)
     return Draft(
         "stribeck",
         f"motor, {form}",
@@ -96,7 +96,7 @@ def stribeck(random: Random, rig: Rig) -> Draft:
 
 def asymmetric_friction(random: Random, rig: Rig) -> Draft:
     """More friction one way than the other, as wear of one flank or a preloaded seal gives."""
-    way = _way(random)
+    way = either_way(random)
     field, unit = [
         ("asymmetry_nut", 0.1 * rig.F_fn),
         ("asymmetry_gear", 0.05 * rig.T_fg),
@@ -169,7 +169,7 @@ def screw_ripple(random: Random, rig: Rig) -> Draft:
 def position_friction(random: Random, rig: Rig) -> Draft:
     """Friction along the stroke: a slope (taper, misalignment) or a local rise (a worn or dirty spot)."""
     if random.random() < 0.5:
-        way = _way(random)
+        way = either_way(random)
         return Draft(
             "position-friction",
             "slope",
@@ -188,7 +188,7 @@ def position_friction(random: Random, rig: Rig) -> Draft:
 
 def winding_self_heating(random: Random, rig: Rig) -> Draft:
     """Copper loss into one heat capacity that cools to the box: copper's coefficient, magnets warmed or not."""
-    constant, flux = _log(random, 8.0, 40.0), float(random.choice([0.0, 0.0, 1e-3]))
+    constant, flux = log_uniform(random, 8.0, 40.0), float(random.choice([0.0, 0.0, 1e-3]))
     return Draft(
         "winding-self-heating",
         "copper and magnets" if flux else "copper",
@@ -227,7 +227,7 @@ def windage(random: Random, rig: Rig) -> Draft:
 def friction_run_in(random: Random, rig: Rig) -> Draft:
     """Friction that fades over the distance since the start, as grease is pushed out of the way."""
     if random.random() < 0.5:
-        distance = _log(random, 8e-3, 5e-2)
+        distance = log_uniform(random, 8e-3, 5e-2)
         return Draft(
             "friction-run-in",
             "nut",
@@ -235,7 +235,7 @@ def friction_run_in(random: Random, rig: Rig) -> Draft:
             8.0,
             _one("run_in_nut_distance", "m", "distance", "length"),
         )
-    angle = _log(random, 5.0, 30.0)
+    angle = log_uniform(random, 5.0, 30.0)
     return Draft(
         "friction-run-in",
         "gearbox",
@@ -246,7 +246,7 @@ def friction_run_in(random: Random, rig: Rig) -> Draft:
 
 def current_sensor_gain(random: Random, rig: Rig) -> Draft:
     """The drive controls a current that it measures by a wrong factor."""
-    way = _way(random)
+    way = either_way(random)
     return Draft(
         "current-sensor-gain",
         "in the loop",
@@ -258,7 +258,7 @@ def current_sensor_gain(random: Random, rig: Rig) -> Draft:
 
 def current_sensor_offset(random: Random, rig: Rig) -> Draft:
     """The drive controls a current that it measures with an offset."""
-    way = _way(random)
+    way = either_way(random)
     return Draft(
         "current-sensor-offset",
         "in the loop",
@@ -270,7 +270,7 @@ def current_sensor_offset(random: Random, rig: Rig) -> Draft:
 
 def velocity_sensor_gain(random: Random, rig: Rig) -> Draft:
     """The sensor of the output velocity is off by a factor."""
-    way = _way(random)
+    way = either_way(random)
     return Draft(
         "velocity-sensor-gain",
         "output",
@@ -293,7 +293,7 @@ def velocity_sensor_delay(random: Random, rig: Rig) -> Draft:
 
 def inverter_dead_time(random: Random, rig: Rig) -> Draft:
     """Voltage lost against the current's sign, softened near zero; phase currents add a sixth harmonic."""
-    current, sixth = _log(random, 0.05, 0.4), float(random.choice([0.0, 0.15]))
+    current, sixth = log_uniform(random, 0.05, 0.4), float(random.choice([0.0, 0.15]))
     return Draft(
         "inverter-dead-time",
         "with a sixth harmonic" if sixth else "soft sign",

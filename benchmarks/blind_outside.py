@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from blind_effects import Draft, Random, _log, _way
+from blind_effects import Draft, Random, either_way, log_uniform
 from blind_plant import Rig
 
 
@@ -39,7 +39,7 @@ def command_delay(random: Random, rig: Rig) -> Draft:
 
 def dwell_friction(random: Random, rig: Rig) -> Draft:
     """Breakaway that grows while the contact rests (Dieterich's age of the contact)."""
-    time, slip = _log(random, 0.1, 0.6), _log(random, 1e-5, 1e-4)
+    time, slip = log_uniform(random, 0.1, 0.6), log_uniform(random, 1e-5, 1e-4)
     return Draft(
         "dwell-friction",
         "age of the contact",
@@ -50,7 +50,7 @@ def dwell_friction(random: Random, rig: Rig) -> Draft:
 
 def vibration(random: Random, rig: Rig) -> Draft:
     """A periodic force on the nut that the load cell does not see."""
-    frequency = _log(random, 3.0, 30.0)
+    frequency = log_uniform(random, 3.0, 30.0)
     return Draft(
         "vibration",
         f"{frequency:.1f} Hz",
@@ -66,13 +66,13 @@ def leaky_integrator(random: Random, rig: Rig) -> Draft:
 
 def spring(random: Random, rig: Rig) -> Draft:
     """A cable, a bellows or a seal that pulls the nut back to where it started."""
-    way = _way(random)
+    way = either_way(random)
     return Draft("spring", "linear", lambda a: {"spring": 1e5 * way * a}, 20.0)
 
 
 def scale_error(random: Random, rig: Rig) -> Draft:
     """Interpolation error of the position scale, periodic in its pitch."""
-    pitch = _log(random, 5e-4, 2e-3)
+    pitch = log_uniform(random, 5e-4, 2e-3)
     return Draft(
         "scale-error",
         f"pitch {pitch * 1e3:.2f} mm",

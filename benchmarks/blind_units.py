@@ -36,7 +36,7 @@ _COLUMNS = {  # column of the file -> (channel, factor to the file's unit)
 _SPREAD = dict.fromkeys(("R_s", "psi_pm", "L", "J", "k_b", "k_s", "d_s", "M", "tau_v"), 0.03)
 _SPREAD |= dict.fromkeys(("T_fm", "b_m", "T_fg", "F_fn", "b_n"), 0.05)
 _COUNTS = {"v": 1.0, "x": 0.2, "w_m": 1.0, "i_q": 1.0, "u_q": 1.0}  # in the visibility
-_THINNING = 7  # samples of one that the projection needs; prime to no schedule
+_THINNING = 7  # every seventh sample is plenty for the projection on 14 directions
 
 
 @dataclass(frozen=True)
@@ -100,16 +100,17 @@ def overall(visibility: Mapping[str, float]) -> float:
 
 def fitted(draft: Draft, target: float, visibility: Visibility, tries: int = 12) -> Present:
     """The amplitude at which `draft` reaches `target`, to 5 %, or its largest plausible one."""
-    low, high, amplitude = 0.0, draft.most, 1.0
+    low, high, amplitude = 0.0, 2.0 * draft.most, 1.0
     for _ in range(tries):
         seen = visibility.of(combined(draft.fields(amplitude)))
         ratio = overall(seen) / target
         if abs(ratio - 1.0) < 0.05 or (ratio < 1.0 and amplitude == draft.most):
             break
         low, high = (amplitude, high) if ratio < 1.0 else (low, amplitude)
-        # Most effects are nearly proportional; a guess that leaves the bracket is halved into it.
-        guess = amplitude / max(ratio, 0.05)
-        amplitude = min(draft.most, guess) if low < guess < high or high == draft.most else 0.5 * (low + high)
+        guess = amplitude / max(
+            ratio, 0.05
+        )  # most effects are nearly proportional, those with a threshold are not
+        amplitude = min(draft.most, guess if low < guess < high else 0.5 * (low + high))
     return Present(draft, amplitude, seen)
 
 

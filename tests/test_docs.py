@@ -1,48 +1,19 @@
-"""The documentation against the code: scenario keys and defaults, refused models, links."""
+"""The documentation against the code: generated pages, refused models, links."""
 
 import re
-from collections.abc import Iterator
+import sys
 from pathlib import Path
-from types import NoneType
-from typing import Any, get_args, get_origin
 
 import pytest
-from pydantic_core import PydanticUndefined
-
-from thsa_cosim.scenario.schema import IdentifyTable, SimulateTable, StagesTable, Table
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 
+sys.path[:0] = [str(DOCS), str(DOCS / "extensions")]
 
-def table_inside(annotation: Any) -> tuple[type[Table] | None, str]:
-    """The table class of a field's type, and how the page writes the keys below it."""
-    if isinstance(annotation, type) and issubclass(annotation, Table):
-        return annotation, "."
-    arguments = [a for a in get_args(annotation) if a is not NoneType]
-    for argument in arguments:
-        found, between = table_inside(argument)
-        if found is not None:
-            return found, ".<variable>." if get_origin(annotation) is dict else between
-    return None, ""
-
-
-def keys(table: type[Table], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Every key below ``table`` with its default as the page writes it."""
-    for name, field in table.model_fields.items():
-        key = prefix + (field.alias or name)
-        inside, between = table_inside(field.annotation)
-        if inside is not None:
-            yield from keys(inside, key + between)
-        elif field.default is PydanticUndefined:
-            yield key, "required"
-        elif field.default is None:
-            yield key, "–"
-        elif isinstance(field.default, str):
-            yield key, f'`"{field.default}"`'
-        else:
-            yield key, f"`{str(field.default).lower()}`"
+from generate import PAGES as PAGES_OF_CODE
+from scenario_page import ROOTS, tables
 
 
 def rows(page: Path) -> list[list[str]]:
@@ -51,11 +22,19 @@ def rows(page: Path) -> list[list[str]]:
     return [[c.strip() for c in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines if line.startswith("|")]
 
 
-def test_the_scenario_page_has_every_key_with_its_default() -> None:
-    wanted = dict(keys(IdentifyTable)) | dict(keys(SimulateTable))
-    wanted |= {key: value for key, value in keys(StagesTable) if key.startswith("stages.")}
-    found = {row[0].strip("`"): row[1] for row in rows(DOCS / "scenario.md") if row[0].startswith("`")}
-    assert found == wanted
+@pytest.mark.parametrize("name", PAGES_OF_CODE)
+def test_pages_that_follow_from_the_code_are_up_to_date(name: str) -> None:
+    written = (DOCS / name).read_text(encoding="utf-8")
+    assert written == PAGES_OF_CODE[name](), "run 'python docs/generate.py'"
+
+
+@pytest.mark.parametrize("root", ROOTS)
+def test_every_key_of_a_scenario_says_what_it_means(root: str) -> None:
+    page = (DOCS / "scenario.md").read_text(encoding="utf-8")
+    for key, field in tables(ROOTS[root]):
+        assert field.description, f"{key} has no docstring in thsa_cosim/scenario"
+        parts = key.split(".")  # of a table that was described before, the table is named
+        assert any(f"`{'.'.join(parts[:k])}`" in page for k in range(len(parts), 0, -1)), key
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(DOCS)))
@@ -66,8 +45,9 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 def test_the_index_names_every_page() -> None:
     index = (DOCS / "README.md").read_text(encoding="utf-8")
-    for page in DOCS.glob("*.md"):
-        assert page.name == "README.md" or f"]({page.name})" in index, page.name
+    for page in [*PAGES, *DOCS.rglob("*.ipynb")]:
+        name = page.relative_to(DOCS).as_posix()
+        assert name == "README.md" or f"]({name})" in index, name
 
 
 REFUSED = [

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 import signal
 import subprocess
 import sys
@@ -344,21 +343,3 @@ i_q = {{ column = "q_current_A", unit = "A" }}
     print(name, {k: e["nrmse"] for k, e in recording["error"].items()})
     assert recording["error"]["v"]["nrmse"] <= 0.0078
     assert recording["error"]["i_q"]["nrmse"] <= 0.0356
-
-
-def test_the_page_names_every_key() -> None:
-    from thsa_cosim.scenario.schema import Table
-    from thsa_cosim.scenario.tune_schema import RequirementTable, TuneTable
-
-    page = (ROOT / "docs" / "tune.md").read_text(encoding="utf-8").split("## Every key")[1]
-    for name, field in TuneTable.model_fields.items():
-        tables = [
-            a for a in (field.annotation, *getattr(field.annotation, "__args__", ())) if isinstance(a, type)
-        ]
-        inner = next((t for t in tables if issubclass(t, Table)), None)
-        assert re.search(rf"`\[?{name}", page), name
-        if inner is None or name == "simulation":
-            continue
-        for key, inside in (RequirementTable if name == "requirements" else inner).model_fields.items():
-            written = inside.alias or key
-            assert re.search(rf"[`.]{written}`", page), (name, key)

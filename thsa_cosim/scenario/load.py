@@ -23,7 +23,8 @@ from thsa_cosim.scenario.model import (
     SimulationSpec,
     TemperaturePoint,
 )
-from thsa_cosim.scenario.schema import KINDS, CommonTable, IdentifyTable, SimulateTable, TemperatureTable
+from thsa_cosim.scenario.recording_schema import TemperatureTable
+from thsa_cosim.scenario.schema import KINDS, CommonTable, IdentifyTable, SimulateTable
 from thsa_cosim.scenario.sentences import from_validation, one_line
 
 

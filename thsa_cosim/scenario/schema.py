@@ -1,183 +1,33 @@
-"""The tables of a scenario file: which keys there are, their types and ranges.
+"""The tables of a scenario file: which keys there are, their types and ranges, and what they mean.
 
-A further kind of scenario is one more class in ``KINDS``.
+A further kind of scenario is one more class in ``KINDS``. After a change run ``python docs/generate.py``.
 """
 
-import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from thsa_cosim.errors import did_you_mean
 from thsa_cosim.laws import FORMS
+from thsa_cosim.scenario.recording_schema import RecordingsTable, TemperatureTable
+from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order
 from thsa_cosim.search.strategies import Strategy
-
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Moderate = Annotated[float, Field(ge=-1e30, le=1e30)]
-Share = Annotated[float, Field(ge=0, le=1)]
-Name = Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")]
-
-
-class Table(BaseModel):
-    """A table of the file: no other keys, no silent conversion of types, no NaN."""
-
-    model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, allow_inf_nan=False, regex_engine="python-re"
-    )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known_keys(cls, data: Any) -> Any:
-        if isinstance(data, dict):
-            known = cls.keys()
-            for key in data:
-                if key not in known:
-                    raise PydanticCustomError(
-                        "unknown_key",
-                        "unknown key {key}; remove it or use one of: {known}.{hint}",
-                        {"key": repr(key), "known": ", ".join(known), "hint": did_you_mean(key, known)},
-                    )
-        return data
-
-    @classmethod
-    def keys(cls) -> tuple[str, ...]:
-        """Names of the keys as they stand in the file."""
-        return tuple(field.alias or name for name, field in cls.model_fields.items())
-
-
-def _check_order(start: float | None, stop: float | None) -> None:
-    if start is not None and stop is not None and not start < stop:
-        raise PydanticCustomError("order", "start must lie before stop")
-
-
-class TimeTable(Table):
-    """``[recordings.time]``."""
-
-    column: Name | None = None
-    unit: str | None = None
-    start: float | None = None
-    stop: float | None = None
-    step: Positive | None = None
-    from_zero: bool = True
-    lead_in: NotNegative = 0.0
-
-    @model_validator(mode="after")
-    def _order(self) -> "TimeTable":
-        _check_order(self.start, self.stop)
-        return self
-
-
-class ColumnTable(Table):
-    """``[recordings.columns.<FMU variable>]``."""
-
-    column: Name | None = None
-    value: Moderate | None = None
-    unit: str | None = None
-    scale: Moderate = 1.0
-    offset: Moderate = 0.0
-    shift: Moderate = 0.0
-    smooth: Literal["none", "mean", "piecewise-linear"] = "none"
-    noise: Positive | None = None
-    interpolation: Literal["linear", "hold"] = "linear"
-
-    @model_validator(mode="after")
-    def _one_source(self) -> "ColumnTable":
-        if (self.column is None) == (self.value is None):
-            raise PydanticCustomError("source", "needs either 'column' (of the file) or 'value' (a constant)")
-        if self.scale == 0.0:
-            raise PydanticCustomError("scale", "scale = 0 would erase the signal; use another number")
-        if self.smooth == "piecewise-linear" and self.interpolation == "hold":
-            raise PydanticCustomError(
-                "smooth", "smooth = 'piecewise-linear' runs between samples; leave out interpolation = 'hold'"
-            )
-        if self.noise is not None and self.smooth != "piecewise-linear":
-            raise PydanticCustomError(
-                "noise",
-                "'noise' goes with smooth = 'piecewise-linear'; a compared output's is [cost.channels]'s",
-            )
-        return self
-
-
-class PartTable(Table):
-    """``[[recordings.parts]]``: a piece of every fit file, in s of the file's time."""
-
-    name: Name
-    use: Literal["fit", "validate"]
-    start: float | None = None
-    stop: float | None = None
-
-    @model_validator(mode="after")
-    def _order(self) -> "PartTable":
-        _check_order(self.start, self.stop)
-        return self
-
-    def overlaps(self, other: "PartTable") -> bool:
-        """Whether the two pieces share samples."""
-        begin = max(-math.inf if p.start is None else p.start for p in (self, other))
-        return begin < min(math.inf if p.stop is None else p.stop for p in (self, other))
-
-
-class RecordingsTable(Table):
-    """``[recordings]``."""
-
-    fit: list[Name] = []
-    validate_: list[Name] = Field(default=[], alias="validate")
-    time: TimeTable = TimeTable()
-    parts: list[PartTable] = []
-    columns: dict[Name, ColumnTable] = Field(min_length=1)
-
-    @model_validator(mode="after")
-    def _apart(self) -> "RecordingsTable":
-        if self.parts and not (self.time.start is None and self.time.stop is None):
-            raise PydanticCustomError(
-                "parts", "time.start and time.stop cut whole files; cut in parts or there"
-            )
-        if self.parts and all(p.use == "validate" for p in self.parts):
-            raise PydanticCustomError("parts", "no entry of parts has use = 'fit'; add one")
-        for k, part in enumerate(self.parts):
-            for other in self.parts[:k]:
-                names = {"one": repr(other.name), "other": repr(part.name)}
-                if part.name == other.name:
-                    raise PydanticCustomError(
-                        "parts", "two entries of parts are named {one}; rename one", names
-                    )
-                if part.use != other.use and part.overlaps(other):
-                    raise PydanticCustomError(
-                        "parts",
-                        "parts {one} and {other} overlap, but only one is fitted; move a bound",
-                        names,
-                    )
-        return self
-
-
-class TemperatureTable(Table):
-    """``[temperature]``: where a recording's temperature is, and what is identified together."""
-
-    input: Name | None = None
-    column: Name | None = None
-    unit: str | None = None
-    round_to: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
-    group: Literal["point", "joint"] = "point"
-
-    @model_validator(mode="after")
-    def _one_source(self) -> "TemperatureTable":
-        if (self.input is None) == (self.column is None):
-            raise PydanticCustomError(
-                "source", "needs either 'input' (an FMU variable) or 'column' (of the file)"
-            )
-        if self.unit is not None and self.column is None:
-            raise PydanticCustomError("unit", "'unit' goes with 'column'; an input's unit is the FMU's")
-        return self
 
 
 class LawTable(Table):
-    """``[parameters.law]``: the form over temperature, and a published curve to compare with."""
+    """``[parameters.law]``: the form over temperature, and a published curve to compare with.
+
+    A parameter without this table gets no law; ``law = {}`` gets one whose form is chosen.
+    """
 
     form: str | None = None
+    """constant, linear, quadratic, cubic, exponential, double-exponential or spline; left out: chosen by
+    corrected AIC."""
     published: list[float] | None = None
+    """Coefficients of a curve to compare with, from α0 up, or α1, β1, α2, β2."""
     published_form: str | None = None
+    """Its form, if it is not ``form``."""
 
     @field_validator("form", "published_form")
     @classmethod
@@ -208,27 +58,42 @@ class LawTable(Table):
 
 
 class ParameterTable(Table):
-    """``[[parameters]]``."""
+    """``[[parameters]]``: what is searched."""
 
     name: Name
+    """Its name in results."""
     variable: Name
+    """The FMU parameter that is varied."""
     unit: str
+    """Unit of the bounds and of the result; converted to the FMU's."""
     lower: float
+    """Lower bound."""
     upper: float
+    """Upper bound."""
     scale: Literal["linear", "log"] = "linear"
+    """``"log"`` for bounds that span decades."""
     start: float | None = None
+    """Takes the place of one vector of the first population."""
     description: str = ""
+    """For tables; left out: the FMU's."""
     per: Literal["point", "recording"] = "point"
-    zero: list[Name] = []
+    """``"recording"``: a value of its own for every recording of a point (an offset, say)."""
+    zero: list[Name] = Field(default_factory=list)
+    """FMU parameters (names or globs) that are 0 in every run."""
     law_block: Name | None = None
+    """Zeroes all other parameters of that block: ``"motor.R_s"`` with the variable ``motor.R_s.a0`` leaves a0
+    as the value itself."""
     law: LawTable | None = None
 
 
 class ChannelTable(Table):
-    """``[cost.channels.<FMU output>]``."""
+    """``[cost.channels.<variable>]``: the outputs that count; without any, every measured one does."""
 
     weight: Positive = 1.0
+    """Factor on the channel's cost."""
     noise: float | str = "estimate"
+    """Standard deviation of the sensor's noise in the FMU variable's unit, or ``"estimate"``: from the
+    recording."""
 
     @field_validator("noise")
     @classmethod
@@ -239,14 +104,16 @@ class ChannelTable(Table):
 
 
 class WindowTable(Table):
-    """``[cost.window]``, in s after the first sample."""
+    """``[cost.window]``: which samples count."""
 
     start: float | None = None
+    """s after the first sample; earlier samples do not count."""
     stop: float | None = None
+    """s after the first sample; later samples do not count."""
 
     @model_validator(mode="after")
     def _order(self) -> "WindowTable":
-        _check_order(self.start, self.stop)
+        check_order(self.start, self.stop)
         return self
 
 
@@ -254,13 +121,16 @@ ErrorName = Literal["squared", "absolute", "huber"]
 
 
 class CostTable(Table):
-    """``[cost]`` (eq. 6)."""
+    """``[cost]``: equation 6."""
 
     error: ErrorName = "squared"
-    also: list[ErrorName] = []
-    channels: dict[Name, ChannelTable] = {}
+    """f in equation 6."""
+    also: list[ErrorName] = Field(default_factory=list)
+    """Further f, evaluated at the estimate and reported beside it."""
+    channels: dict[Name, ChannelTable] = Field(default_factory=dict)
     window: WindowTable = WindowTable()
-    mask: list[list[float]] = []
+    mask: list[list[float]] = Field(default_factory=list)
+    """Pairs ``[from, to]`` in s after the first sample that do not count."""
 
     @field_validator("mask")
     @classmethod
@@ -271,49 +141,76 @@ class CostTable(Table):
         return mask
 
 
-class SearchTable(Table):
-    """``[search]``: the article's setting by default."""
+class EvolutionTable(Table):
+    """``[search]``: differential evolution, the article's setting by default."""
 
     population: Annotated[int, Field(ge=5, le=100_000)] = 45
+    """S, the vectors of a generation."""
     generations: Annotated[int, Field(ge=1, le=1_000_000)] = 30
+    """G, at most."""
     mutation: Annotated[float, Field(gt=0, lt=2)] = 0.16
+    """F."""
     crossover: Share = 0.5
+    """CR."""
     strategy: Strategy = "rand1bin"
+    """One of SciPy's strategies."""
     tolerance: NotNegative = 1e-3
+    """Stop once all costs of the population lie within this share of the best; 0: never."""
+
+
+class SearchTable(EvolutionTable):
+    """``[search]``: differential evolution, the article's setting by default."""
+
     polish: bool = True
-    profile: list[Name] = []
+    """Least squares from the best vector; standard errors need it."""
+    profile: list[Name] = Field(default_factory=list)
+    """Names of parameters whose profile likelihood is computed."""
 
 
 class SimulationTable(Table):
-    """``[simulation]``."""
+    """``[simulation]``: how the FMU is run."""
 
     interface: Literal["co-simulation", "model-exchange"] | None = None
+    """Left out: Co-Simulation if the FMU has it."""
     tolerance: Annotated[float, Field(gt=0, lt=1)] | None = None
+    """Relative tolerance handed to the FMU (or to CVODE); left out: the FMU's own."""
     step: Positive | None = None
+    """s between communication points; left out: the recording's samples."""
     deadline: Positive = 60.0
+    """s; a run that takes longer is killed and counts as failed."""
     memory: Positive | None = None
+    """MB by which a worker may grow before its run is killed."""
     reuse: Literal["fresh", "reset"] = "fresh"
+    """``"reset"`` keeps one FMU instance and resets it: only where ``thsa-cosim check`` found that right."""
 
 
 class CommonTable(Table):
     """Keys of every kind that runs an FMU against recordings."""
 
     kind: str
+    """What to do: the command of that name runs it."""
     title: str = ""
+    """Shown in tables, plots and ``result.json``."""
     fmu: Name
+    """Path of the FMU. ``--fmu`` replaces it."""
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
+    """Of the search; the same seed repeats a study exactly. ``--seed`` replaces it."""
     recordings: RecordingsTable
     temperature: TemperatureTable | None = None
     parameter_set: Name | None = None
-    fixed: dict[Name, float | bool] = {}
+    """Path of an SSV file with start values, for example the ``identified.ssv`` of a study."""
+    fixed: dict[Name, float | bool] = Field(default_factory=dict)
+    """Start values held in every run, by FMU variable, in the FMU's units; they win over ``parameter_set``.
+    """
     cost: CostTable = CostTable()
     simulation: SimulationTable = SimulationTable()
 
 
 class SimulateTable(CommonTable):
-    """``kind = "simulate"``: run once, compare with the recordings."""
+    """``kind = "simulate"``: run once per recording, compare."""
 
-    outputs: list[Name] = []
+    outputs: list[Name] = Field(default_factory=list)
+    """Outputs to record besides those with a column; none named: all."""
 
 
 class IdentifyTable(CommonTable):
@@ -324,18 +221,26 @@ class IdentifyTable(CommonTable):
 
 
 class StageTable(Table):
-    """``[[stages]]``: a scenario of its own; ``give`` names results that later stages get (default: all)."""
+    """``[[stages]]``: what is run, in order."""
 
     scenario: Name
+    """Path of the scenario."""
     give: list[Name] | None = None
+    """Names of results that later stages get; left out: all."""
 
 
 class StagesTable(Table):
-    """A scenario that runs others in order, each with what the earlier ones found."""
+    """``kind = "identify"`` in stages: scenarios in order, each with what the earlier ones found.
+
+    A stage gets the values of its own temperatures, with their uncertainty.
+    """
 
     kind: str
+    """``"identify"``."""
     title: str = ""
+    """Shown in tables and ``result.json``."""
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
+    """Replaces those of the stages."""
     stages: list[StageTable] = Field(min_length=1)
 
 

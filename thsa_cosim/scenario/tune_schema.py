@@ -6,23 +6,33 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from thsa_cosim.scenario.schema import Moderate, Name, NotNegative, Positive, Share, SimulationTable, Table
-from thsa_cosim.search.strategies import Strategy
+from thsa_cosim.scenario.schema import EvolutionTable, SimulationTable
+from thsa_cosim.scenario.table import Moderate, Name, NotNegative, Positive, Share, Table
 
 
 class CommandTable(Table):
     """``[command]``: what the loop is told to do, and which output should follow."""
 
     input: Name
+    """The FMU input that is commanded."""
     output: Name
+    """The FMU output that should follow."""
     unit: str | None = None
+    """Of ``final``, ``rate`` and ``points``; left out: the input's."""
     shape: Literal["ramp", "step", "points"]
+    """A ramp takes ``final`` and ``rate``, a step ``final``, ``"points"`` the ``points``."""
     final: Moderate | None = None
+    """Last value."""
     rate: Positive | None = None
+    """Slope of a ramp, per s."""
     begin: NotNegative = 0.0
+    """s, when a ramp or step begins."""
     points: list[list[float]] | None = None
+    """Pairs ``[time in s, command]``, linear between them."""
     stop: Positive
+    """s, the end."""
     step: Positive = 0.001
+    """s, communication step; the sum in equation 7 runs over these samples."""
 
     @model_validator(mode="after")
     def _complete(self) -> "CommandTable":
@@ -57,14 +67,23 @@ class CommandTable(Table):
 
 
 class ConditionTable(Table):
-    """``[conditions.<FMU input or parameter>]``: what the loop must serve under, listed or as a range."""
+    """``[conditions.<variable>]``: what the loop must serve under.
+
+    Values of FMU inputs or parameters, listed or as a range; all combinations are simulated for each set of gains.
+    """
 
     values: list[Moderate] | None = Field(default=None, min_length=1, max_length=1000)
+    """List of values; either this or all of ``from``, ``to``, ``step``."""
     from_: float | None = Field(default=None, alias="from")
+    """First value."""
     to: float | None = None
+    """Last value."""
     step: Positive | None = None
+    """Between values."""
     unit: str | None = None
+    """Left out: the FMU's."""
     weights: list[Positive] | None = None
+    """One per value, with ``robust.combine = "sum"``."""
 
     @model_validator(mode="after")
     def _one_source(self) -> "ConditionTable":
@@ -84,28 +103,43 @@ class ConditionTable(Table):
 
 
 class GainTable(Table):
-    """``[[parameters]]``: a gain, that is any parameter of the FMU."""
+    """``[[parameters]]``: the gains, that is any parameters of the FMU."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+    """Its name in results and in ``before`` and ``compare``."""
     variable: Name
+    """The FMU parameter."""
     unit: str
+    """Unit of bounds and result; converted to the FMU's."""
     lower: float
+    """Lower bound."""
     upper: float
+    """Upper bound."""
     scale: Literal["linear", "log"] = "log"
+    """Scale of the search."""
     start: float | None = None
+    """Takes the place of one vector of the first population."""
     description: str = ""
+    """For tables; left out: the FMU's."""
 
 
 class MetricsTable(Table):
     """``[metrics]``: how rise time and steady-state error are read off a response."""
 
     rise: Literal["first-reach", "between"] = "first-reach"
+    """From the start of the command to ``fraction``, or ``"between"`` ``low`` and ``high``."""
     fraction: Annotated[float, Field(gt=0, le=1)] = 0.95
+    """Share of the final value whose first reach ends the rise."""
     low: Share = 0.1
+    """Share at which a rise "between" begins."""
     high: Share = 0.9
+    """Share at which it ends."""
     window: list[float]
+    """``[from, to]`` in s, of the steady-state error."""
     settling_band: Annotated[float, Field(gt=0, lt=1)] = 0.02
+    """Share of the final value within which the response has settled."""
     effort: Name | None = None
+    """The signal whose root mean square is the effort."""
 
     @model_validator(mode="after")
     def _order(self) -> "MetricsTable":
@@ -117,12 +151,16 @@ class MetricsTable(Table):
 
 
 class ControlCostTable(Table):
-    """``[cost]`` (eq. 7)."""
+    """``[cost]`` of a tuning: equation 7."""
 
     unit: str | None = None
+    """Unit in which velocity errors count; left out: the command's."""
     kappa_rise: NotNegative
+    """κ1, in 1/s."""
     kappa_steady: NotNegative
+    """κ2."""
     steady: Literal["absolute", "signed"] = "absolute"
+    """``"signed"`` takes e_ss as the article prints it, which rewards running too fast."""
 
 
 Metric = Literal[
@@ -132,16 +170,24 @@ Metric = Literal[
 
 
 class RequirementTable(Table):
-    """``[[requirements]]``: a limit on a metric, hard (infeasible beyond) or soft (a penalty)."""
+    """``[[requirements]]``: limits on metrics."""
 
     metric: Metric
+    """What is limited."""
     signal: Name | None = None
+    """Of a ``peak``: whose."""
     unit: str | None = None
+    """Of a ``peak``; left out: the signal's. The others have fixed units."""
     maximum: float | None = None
+    """Upper limit; either this or ``minimum``."""
     minimum: float | None = None
+    """Lower limit."""
     hard: bool = True
+    """Gains beyond a hard limit are infeasible; beyond a soft one they cost ``penalty``."""
     penalty: Positive = 1.0
+    """Of a soft limit, per ``scale`` of excess."""
     scale: Positive | None = None
+    """What an excess is measured in; left out: the limit's size."""
 
     @model_validator(mode="after")
     def _complete(self) -> "RequirementTable":
@@ -157,35 +203,48 @@ class RequirementTable(Table):
 
 
 class LoopTable(Table):
-    """``[loop]``: where the velocity loop is opened for its margins, and at which time of the response."""
+    """``[loop]``: where the loop is opened for its margins."""
 
     signal: Name
+    """The controller's output."""
     at: NotNegative | None = None
+    """s, at which state of the response; left out: at the end."""
     gains: list[Name] | None = Field(default=None, min_length=1)
+    """Parameters that act through that signal alone; left out: all."""
     margins: Literal["own", "python-control"] = "own"
+    """``"python-control"`` has python-control read gain and phase margin (extra ``control``)."""
 
 
 class RobustTable(Table):
     """``[robust]``: how the conditions of one set of gains become one number."""
 
     combine: Literal["worst", "sum"] = "worst"
+    """The worst of them, or their weighted sum."""
 
 
 class UncertaintyTable(Table):
     """``[uncertainty]``: parameter samples from the covariance of an identification."""
 
     result: Name
+    """Path of its ``result.json``."""
     samples: Annotated[int, Field(ge=1, le=1000)] = 8
+    """How many."""
     temperature: Name | None = None
+    """The condition that is the temperature."""
     variables: dict[Name, Name] = Field(min_length=1)
+    """Parameter of the identification = FMU parameter."""
 
 
 class ScheduleTable(Table):
     """``[schedule]``: gains for each value of one or two conditions, and the sweep that checks them."""
 
     over: list[Name] = Field(min_length=1, max_length=2)
+    """One or two conditions."""
     smoothing: NotNegative = 1.0
+    """Strength with which gains of neighbouring nodes are drawn together; lowered where limits would break.
+    """
     reserve: Annotated[float, Field(ge=0, lt=1)] = 0.03
+    """Share of the limits that the nodes' searches keep free for interpolation."""
     check: dict[Name, ConditionTable] = Field(default_factory=dict)
 
 
@@ -193,50 +252,56 @@ class ParetoTable(Table):
     """``[pareto]``: two terms of the evaluated gains that are set against each other."""
 
     x: str = "effort"
+    """A term: tracking, rise_time, effort or another metric."""
     y: str = "tracking"
+    """The other."""
 
 
 class LineTable(Table):
     """``[line]``: the ratio of two parameters that the population draws towards."""
 
     numerator: Name
+    """A parameter."""
     denominator: Name
+    """Another."""
     generations: Annotated[int, Field(ge=1)] = 5
+    """The last so many count."""
     published: float | None = None
+    """A ratio to compare with."""
 
 
 class SurfaceTable(Table):
-    """``[surface]``: the cost over the plane of two parameters, ``points`` along each."""
+    """``[surface]``: the cost over the plane of two parameters."""
 
     parameters: list[Name] = Field(min_length=2, max_length=2)
+    """Two of them."""
     points: Annotated[int, Field(ge=3, le=200)] = 21
-
-
-class TuneSearchTable(Table):
-    """``[search]``: the article's setting by default."""
-
-    population: Annotated[int, Field(ge=5, le=100_000)] = 45
-    generations: Annotated[int, Field(ge=1, le=1_000_000)] = 30
-    mutation: Annotated[float, Field(gt=0, lt=2)] = 0.16
-    crossover: Share = 0.5
-    strategy: Strategy = "rand1bin"
-    tolerance: NotNegative = 1e-3
+    """Along each."""
 
 
 class TuneTable(Table):
     """``kind = "tune"``: find gains for commands and conditions that the scenario describes itself."""
 
     kind: Literal["tune"]
+    """``"tune"``."""
     title: str = ""
+    """Shown in tables and plots."""
     fmu: Name
+    """Path of the FMU. ``--fmu`` replaces it."""
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
+    """Of the search and of the parameter samples. ``--seed`` replaces it."""
     parameter_set: Name | None = None
+    """Path of an SSV file with start values: the ``identified.ssv`` of a study."""
     fixed: dict[Name, float | bool] = Field(default_factory=dict)
+    """Start values held in every run, by FMU variable, in the FMU's units; they win over ``parameter_set``.
+    """
     command: CommandTable
     conditions: dict[Name, ConditionTable] = Field(default_factory=dict)
     parameters: list[GainTable] = Field(min_length=1)
     before: dict[Name, float] = Field(min_length=1)
+    """A value of every parameter: what is tuned is held against it."""
     compare: dict[Name, dict[Name, float]] = Field(default_factory=dict)
+    """Further sets of values, by name: all of them, as in ``before``."""
     metrics: MetricsTable
     cost: ControlCostTable
     requirements: list[RequirementTable] = Field(default_factory=list)
@@ -247,5 +312,5 @@ class TuneTable(Table):
     pareto: ParetoTable | None = None
     line: LineTable | None = None
     surface: SurfaceTable | None = None
-    search: TuneSearchTable = TuneSearchTable()
+    search: EvolutionTable = EvolutionTable()
     simulation: SimulationTable = SimulationTable()

@@ -1,0 +1,52 @@
+"""What all tables of a scenario file have in common."""
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from thsa_cosim.errors import did_you_mean
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Moderate = Annotated[float, Field(ge=-1e30, le=1e30)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Name = Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")]
+
+
+class Table(BaseModel):
+    """A table of the file: no other keys, no silent conversion of types, no NaN."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        strict=True,
+        frozen=True,
+        allow_inf_nan=False,
+        regex_engine="python-re",
+        use_attribute_docstrings=True,  # what a key means stands below it; docs/scenario.md is made from that
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: Any) -> Any:
+        if isinstance(data, dict):
+            known = cls.keys()
+            for key in data:
+                if key not in known:
+                    raise PydanticCustomError(
+                        "unknown_key",
+                        "unknown key {key}; remove it or use one of: {known}.{hint}",
+                        {"key": repr(key), "known": ", ".join(known), "hint": did_you_mean(key, known)},
+                    )
+        return data
+
+    @classmethod
+    def keys(cls) -> tuple[str, ...]:
+        """Names of the keys as they stand in the file."""
+        return tuple(field.alias or name for name, field in cls.model_fields.items())
+
+
+def check_order(start: float | None, stop: float | None) -> None:
+    """Raise for a start that does not lie before its stop."""
+    if start is not None and stop is not None and not start < stop:
+        raise PydanticCustomError("order", "start must lie before stop")

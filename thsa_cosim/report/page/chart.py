@@ -20,7 +20,7 @@ MEASURED, SIMULATED = "var(--measured)", "var(--simulated)"
 PUBLISHED, RESIDUAL, INK = "var(--published)", "var(--residual)", "var(--ink)"
 BEFORE, AFTER = "var(--before)", "var(--after)"
 
-_PIXELS_ABOVE, _PIXELS_BELOW, _PIXELS_BETWEEN = 56, 52, 62
+_PIXELS_ABOVE, _PIXELS_BELOW, _PIXELS_BETWEEN = 64, 52, 72
 
 
 def plain(text: object) -> str:
@@ -91,7 +91,7 @@ class Chart:
         self._layout: dict[str, Any] = {
             "height": self.height,
             "margin": {"t": _PIXELS_ABOVE, "b": _PIXELS_BELOW, "l": 78, "r": 24},
-            "legend": {"orientation": "h", "x": 0.0, "y": 1.0 + 12 / plot_height, "yanchor": "bottom"},
+            "legend": {"orientation": "h", "x": 0.0, "y": 1.0 + 22 / plot_height, "yanchor": "bottom"},
             "annotations": [],
             "shapes": [],
         }
@@ -175,6 +175,7 @@ class Chart:
             chosen = envelope(y)
             x, y = x[chosen], y[chosen]
         line = {"color": style.get("colour", SERIES[0]), "width": style.get("width", 1.5)}
+        line["simplify"] = False  # plotly's own thinning leaves kinks in smooth curves
         if "dash" in style:
             line["dash"] = style["dash"]
         extra = style.get("extra", {})

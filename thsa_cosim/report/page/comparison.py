@@ -8,7 +8,7 @@ from thsa_cosim.report.page import chart
 from thsa_cosim.report.page.chart import Chart
 from thsa_cosim.report.page.content import Block, Cell, Column, Figure, Fold, Section, Table, Text
 from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.text import DASH, count, degrees, number_cell, percent, quantity, text_cell
+from thsa_cosim.report.page.text import DASH, count, degrees, percent, quantity, significant_cell, text_cell
 from thsa_cosim.report.signal_files import SignalFile, read_signals, signal_paths
 from thsa_cosim.report.tables import number
 
@@ -37,6 +37,10 @@ def comparison(part: Part) -> Section | None:
         blocks += [Text(f"{r['name']} was not simulated: {r['reason']}", "bad") for r in failed]
     blocks += recording_folds(part, signals)
     return Section(f"{part.prefix}signals", "Measured against simulated", tuple(blocks))
+
+
+def _temperature(value: float | None) -> Cell:
+    return Cell(DASH if value is None else degrees(value).removesuffix(" °C"), value)
 
 
 def ratio_mark(ratio: float | None) -> str:
@@ -72,12 +76,12 @@ def _errors(recordings: list[Json]) -> Table:
                     text_cell(
                         {"fit": "fitted", "validate": "held out"}.get(recording["role"], recording["role"])
                     ),
-                    number_cell(recording.get("temperature_degC")),
+                    _temperature(recording.get("temperature_degC")),
                     text_cell(name),
                     text_cell(error["unit"]),
-                    number_cell(error["rmse"], 3),
-                    number_cell(error.get("noise"), 3),
-                    number_cell(ratio, 3, ratio_mark(ratio)),
+                    significant_cell(error["rmse"]),
+                    significant_cell(error.get("noise")),
+                    significant_cell(ratio, 3, ratio_mark(ratio)),
                     Cell(percent(share), share),
                 )
             )
@@ -88,6 +92,10 @@ def _errors(recordings: list[Json]) -> Table:
 def recording_folds(part: Part, signals: list[SignalFile]) -> list[Block]:
     """One fold per recording with its figure; the worst one is open."""
     facts = {(r["role"], r["name"]): r for r in (part.result or {}).get("recordings", [])}
+    order = list(facts)
+    signals = sorted(
+        signals, key=lambda s: order.index((s.role, s.name)) if (s.role, s.name) in facts else len(order)
+    )
     scores = [_worst(found) for found in signals]
     opened = int(np.argmax(scores)) if scores else 0
     folds: list[Block] = []
@@ -118,8 +126,8 @@ def compare_figure(name: str, found: SignalFile, errors: Json) -> Figure:
     drawn = Chart(
         name,
         rows=2 * len(channels),
-        row_height=112,
-        weights=[2.2, 1.0] * len(channels),
+        row_height=125,
+        weights=[2.0, 1.2] * len(channels),
         shared_x=True,
         between=30,
     )

@@ -1,11 +1,13 @@
 """The search: cost against generation with the population's spread, and how each search ended."""
 
+import numpy as np
+
 from thsa_cosim.report.page import chart
 from thsa_cosim.report.page.chart import Chart
 from thsa_cosim.report.page.content import Block, Column, Figure, Section, Table
 from thsa_cosim.report.page.folder import Json, Part
 from thsa_cosim.report.page.populations import Evolution, evolutions
-from thsa_cosim.report.page.text import number_cell, text_cell
+from thsa_cosim.report.page.text import number_cell, search_label, text_cell
 from thsa_cosim.tune.combine import INFEASIBLE
 
 #: Panels side by side.
@@ -87,13 +89,15 @@ def _figure(part: Part, found: list[Evolution]) -> Figure:
         drawn.band(generation, lower, upper, "middle half", at=at)
         drawn.line(generation, middle, "median", at=at, colour=chart.INK, width=1.2, dash="dot")
         drawn.line(generation, low, "best", at=at, colour=chart.SIMULATED, width=2)
-        drawn.title(evolution.label, *at)
+        drawn.title(search_label(evolution.label), *at)
         last_row, first_column = k + columns >= len(found), at[1] == 0
         drawn.axes(
             *at,
             x="generation [1]" if last_row else "",
             y=("cost [1]" if part.kind == "tune" else "cost per sample [1]") if first_column else "",
             log_y=True,
+            # Labels between the powers of ten clutter a panel that spans several of them.
+            dtick_y=1 if np.nanmax(high) > 30.0 * np.nanmin(low) else None,
             x_options={"dtick": max(1, -(-len(generation) // 6)), "rangemode": "tozero"},
         )
     what = "Cost (equation 7 with requirements; vectors that break a hard one are left out)"
@@ -109,7 +113,11 @@ def _ends_table(part: Part, ends: list[Json]) -> Table:
     columns.append(Column("evolution ended because", numeric=False))
     rows = []
     for end in ends:
-        row = [text_cell(end["label"]), number_cell(end["generations"] - 1), number_cell(end["cost"])]
+        row = [
+            text_cell(search_label(end["label"])),
+            number_cell(end["generations"] - 1),
+            number_cell(end["cost"]),
+        ]
         if part.kind != "tune":
             row += [number_cell(end["evaluations"], 6), text_cell(end["polish"] or "no polish")]
         rows.append((*row, text_cell(end["stopped"])))
@@ -127,10 +135,8 @@ def _so_far_table(part: Part, found: list[Evolution]) -> Table:
     rows = []
     for evolution in found:
         best = float(evolution.quantiles[0, -1]) * scales.get(evolution.label, 1.0)
-        done = len(evolution.costs) - 1
-        rows.append(
-            (text_cell(evolution.label), number_cell(done), number_cell(part.generations), number_cell(best))
-        )
+        numbers = (len(evolution.costs) - 1, part.generations, best)
+        rows.append((text_cell(search_label(evolution.label)), *map(number_cell, numbers)))
     return Table("How far the searches are", columns, rows)
 
 

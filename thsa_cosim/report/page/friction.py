@@ -39,7 +39,7 @@ def friction(result: Json, prefix: str = "") -> Section | None:
             colorscale="Viridis",
             contours={"showlabels": True, "labelfont": {"color": "white", "size": 11}},
             line={"width": 0.5, "color": "white"},
-            colorbar={"title": {"text": f"friction [{unit}]", "side": "right"}},
+            colorbar={"title": {"text": f"friction [{unit}]", "side": "right", "font": {"size": 13}}},
             hovertemplate="speed %{x:.3g}<br>temperature %{y:.3g} °C<br>friction %{z:.4g}<extra></extra>",
         )
         drawn.axes(x=f"speed [{element.unit}]", y="temperature [°C]")

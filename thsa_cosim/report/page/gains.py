@@ -31,7 +31,7 @@ def gains(part: Part) -> Section | None:
     columns = [Column("quantity", numeric=False), Column("unit", numeric=False)]
     columns += [*(Column(name) for name in sets), Column("limit", numeric=False)]
     where = "" if len(result.get("groups", [])) < 2 else ", worst over all conditions"
-    note = "Marked: beyond the limit." if any(not s["feasible"] for s in sets.values()) else ""
+    note = "Red: beyond the limit." if any(not s["feasible"] for s in sets.values()) else ""
     blocks: list[Block] = [Table(f"Before and after{where}", columns, rows, note)]
     parts = {name: s["cost_terms"] for name, s in sets.items() if s.get("cost_terms")}
     if parts:
@@ -56,15 +56,28 @@ def limits_of(result: Json) -> dict[str, str]:
     return found
 
 
+def term_label(name: str) -> str:
+    """``rise time``, ``peak of i_q``."""
+    metric, _, signal = name.partition(".")
+    return metric.replace("_", " ") + (f" of {signal}" if signal else "")
+
+
+def _term_cell(value: float | None, name: str, mark: str) -> Cell:
+    """A term; a margin that nothing limits (its line is never crossed) is kept as null and shown as ∞."""
+    if value is None and name.endswith("_margin") and mark == "good":
+        return Cell("∞", float("inf"), mark)
+    return number_cell(value, mark=mark)
+
+
 def term_rows(result: Json, values: Mapping[str, Json], sets: Mapping[str, Json]) -> list[list[Cell]]:
     """One row per term: its value for every set, marked where it exceeds, and its limit."""
     limits, rows = limits_of(result), []
     for name, unit in result.get("term_units", {}).items():
-        row = [text_cell(name.replace("_", " ")), text_cell(unit)]
+        row = [text_cell(term_label(name)), text_cell(unit)]
         for key, scored in sets.items():
             beyond = (scored.get("excess") or {}).get(name) or 0.0
             mark = "bad" if beyond > 0.0 else "good" if name in limits else ""
-            row.append(number_cell(values[key].get(name), mark=mark))
+            row.append(_term_cell(values[key].get(name), name, mark))
         row.append(text_cell(limits.get(name, DASH)))
         rows.append(row)
     return rows
@@ -74,7 +87,6 @@ def _parts_table(parts: Mapping[str, Json]) -> Table:
     columns = [Column("part of equation 7", numeric=False), *(Column(name) for name in parts)]
     names = list(dict.fromkeys(name for terms in parts.values() for name in terms))
     rows = [
-        [text_cell(n.replace("_", " ")), *(number_cell(terms.get(n)) for terms in parts.values())]
-        for n in names
+        [text_cell(term_label(n)), *(number_cell(terms.get(n)) for terms in parts.values())] for n in names
     ]
     return Table("What the cost is made of", columns, rows)

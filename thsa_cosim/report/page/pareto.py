@@ -2,8 +2,9 @@
 
 from thsa_cosim.report.page import chart
 from thsa_cosim.report.page.chart import Chart
-from thsa_cosim.report.page.content import Block, Column, Section, Table
+from thsa_cosim.report.page.content import Block, Column, Fold, Section, Table
 from thsa_cosim.report.page.folder import Json, Part
+from thsa_cosim.report.page.gains import term_label
 from thsa_cosim.report.page.text import number_cell
 from thsa_cosim.tune.combine import INFEASIBLE
 from thsa_cosim.tune.problem import ALL
@@ -17,7 +18,7 @@ def pareto(part: Part) -> Section | None:
         return None
     x_name, y_name = content["x"], content["y"]
     units: Json = result.get("term_units", {})
-    labels = [f"{n.replace('_', ' ')} [{units.get(n, '1')}]" for n in (x_name, y_name)]
+    labels = [f"{term_label(n)} [{units.get(n, '1')}]" for n in (x_name, y_name)]
     drawn = Chart(f"{part.prefix}pareto", row_height=360)
     tried = _tried(part, x_name, y_name)
     if tried is not None:
@@ -27,12 +28,13 @@ def pareto(part: Part) -> Section | None:
     drawn.points(x, y, "not dominated", joined=True, colour=chart.SIMULATED, size=7)
     drawn.axes(x=labels[0], y=labels[1])
     gain_units: Json = result.get("units", {})
-    columns = [Column(n.replace("_", " "), units.get(n, "1")) for n in (x_name, y_name)]
+    columns = [Column(term_label(n), units.get(n, "1")) for n in (x_name, y_name)]
     columns += [Column(n, u) for n, u in gain_units.items()]
     rows = [[number_cell(row[key]) for key in (x_name, y_name, *gain_units)] for row in front]
+    table = Table("Gains that nothing beats in both", columns, rows)
     blocks: tuple[Block, ...] = (
         drawn.build("Each point is one set of gains that keeps every hard requirement."),
-        Table("Gains that nothing beats in both", columns, rows),
+        Fold(f"The {len(rows)} sets of gains that nothing beats in both", (table,)),
     )
     return Section(f"{part.prefix}pareto", "Trade-off", blocks)
 

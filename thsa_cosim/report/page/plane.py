@@ -9,7 +9,7 @@ from thsa_cosim.report.page.convergence import part_evolutions
 from thsa_cosim.report.page.folder import Json, Part
 from thsa_cosim.report.page.gains import gain_sets
 from thsa_cosim.report.page.populations import Evolution
-from thsa_cosim.report.page.responses import set_colour
+from thsa_cosim.report.page.responses import set_colours
 from thsa_cosim.report.page.text import quantity
 from thsa_cosim.report.tables import number
 
@@ -32,11 +32,13 @@ def plane(part: Part) -> Section | None:
     logarithmic = [_is_log(surface, found[0], k, name) for k, name in enumerate(names)]
     if surface:
         _draw_surface(drawn, surface)
+    sets = gain_sets(result)
+    colours = set_colours(sets)
     _draw_population(drawn, found[0], [part.journal.names.index(n) for n in names])
-    for rank, (name, scored) in enumerate(gain_sets(result).items()):
+    for name, scored in sets.items():
         x, y = (float(scored["gains"][n]) for n in names)
         symbol = "star" if name == "after" else "diamond"
-        colour = set_colour(name, rank - 1)
+        colour = colours[name]
         drawn.points(
             [x], [y], name, size=14, colour=colour, symbol=symbol, edge=1.5, edge_colour="var(--paper)"
         )
@@ -46,9 +48,8 @@ def plane(part: Part) -> Section | None:
         _draw_line(drawn, line, names, corners)
     drawn.axes(x=f"{names[0]} [{units.get(names[0], '1')}]", y=f"{names[1]} [{units.get(names[1], '1')}]")
     spans = [np.log10(c) if is_log else np.array(c) for c, is_log in zip(corners, logarithmic, strict=True)]
-    drawn.axes(
-        log_x=logarithmic[0], log_y=logarithmic[1], x_range=spans[0].tolist(), y_range=spans[1].tolist()
-    )
+    drawn.axes(log_x=logarithmic[0], log_y=logarithmic[1], dtick_x="D2", dtick_y="D2")
+    drawn.axes(x_range=spans[0].tolist(), y_range=spans[1].tolist())
     figure = drawn.build(f"The plane of {names[0]} and {names[1]}: {found[0].label}.")
     blocks: tuple[Block, ...] = (Text(_line_sentence(line)), figure) if line else (figure,)
     return Section(f"{part.prefix}plane", f"Plane of {names[0]} and {names[1]}", blocks)
@@ -100,30 +101,27 @@ def _draw_surface(drawn: Chart, surface: Json) -> None:
         colorscale="Viridis",
         reversescale=True,
         line={"width": 0},
-        colorbar={"title": {"text": "log₁₀ of equation 7 [1]", "side": "right"}, "len": 0.9},
+        colorbar={
+            "title": {"text": "log₁₀ of equation 7 [1]", "side": "right", "font": {"size": 13}},
+            "len": 0.9,
+        },
         hovertemplate=f"{plain(x_name)} %{{x:.4g}}<br>{plain(y_name)} %{{y:.4g}}<br>log₁₀ %{{z:.4g}}<extra></extra>",
     )
-    broken = np.where(np.isfinite(cost), np.nan, 1.0)
-    if np.isfinite(broken).any():
-        veil = [[0, "rgba(60,60,60,0.55)"], [1, "rgba(60,60,60,0.55)"]]
+    broken = np.where(np.isfinite(cost), 0.0, 1.0)
+    if broken.any():
         drawn.add(
             0,
             0,
-            "",
-            type="heatmap",
+            "breaks a hard requirement",
+            type="contour",
             **place,
             z=packed(broken),
-            colorscale=veil,
+            # Plotly fills where the constraint does not hold.
+            contours={"type": "constraint", "operation": "<", "value": 0.5},
+            fillcolor="rgba(60, 60, 60, 0.5)",
+            line={"width": 1, "color": "rgb(40, 40, 40)"},
             showscale=False,
             hoverinfo="skip",
-        )
-        drawn.points(
-            [np.nan],
-            [np.nan],
-            "breaks a hard requirement",
-            symbol="square",
-            size=12,
-            colour="rgba(60,60,60,0.55)",
         )
 
 

@@ -1,5 +1,7 @@
 """Responses of a tuning: command and velocity, error and effort, before and after, under every condition."""
 
+from collections.abc import Iterable
+
 from thsa_cosim.report.page import chart
 from thsa_cosim.report.page.chart import Chart
 from thsa_cosim.report.page.content import Block, Figure, Fold, Section
@@ -21,9 +23,13 @@ def responses(part: Part) -> Section | None:
     return Section(f"{part.prefix}responses", "Responses", tuple(folds))
 
 
-def set_colour(name: str, rank: int) -> str:
-    """The colour of a set of gains wherever it is drawn."""
-    return {"before": chart.BEFORE, "after": chart.AFTER}.get(name, chart.SERIES[2 + rank % 6])
+def set_colours(names: Iterable[str]) -> dict[str, str]:
+    """The colour of every set of gains, the same wherever it is drawn."""
+    fixed = {COMMAND: chart.MEASURED, "before": chart.BEFORE, "after": chart.AFTER}
+    fixed |= {"schedule": chart.AFTER, "best single set": chart.SERIES[3]}
+    others = [name for name in names if name not in fixed]
+    free = (chart.SERIES[2], *chart.SERIES[4:])
+    return fixed | {name: free[k % len(free)] for k, name in enumerate(others)}
 
 
 def _figure(name: str, found: SignalFile) -> Figure:
@@ -39,14 +45,14 @@ def _figure(name: str, found: SignalFile) -> Figure:
     sets = [v for v in found.channels[main] if v != COMMAND]
     if command is not None:
         drawn.line(found.time, command, COMMAND, colour=chart.MEASURED, dash="dash", width=1.5)
-    for rank, variant in enumerate(sets):
-        colour = set_colour(variant, rank)
+    colours = set_colours(sets)
+    for variant in sets:
         for row, channel in enumerate([main, main, *others]):
             values = found.channels[channel].get(variant)
             if values is None or (row == 1 and command is None):
                 continue
             shown = command - values if row == 1 and command is not None else values
-            drawn.line(found.time, shown, variant, at=(row, 0), colour=colour, width=1.5, thin=True)
+            drawn.line(found.time, shown, variant, at=(row, 0), colour=colours[variant], width=1.5, thin=True)
     drawn.axes(0, 0, y=f"{main} [{found.units.get(main, '1')}]")
     drawn.axes(1, 0, y=f"error [{found.units.get(main, '1')}]")
     for row, channel in enumerate(others, start=2):

@@ -10,8 +10,8 @@ from thsa_cosim.report.page import chart
 from thsa_cosim.report.page.chart import Chart
 from thsa_cosim.report.page.content import Block, Column, Figure, Section, Table
 from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.gains import limits_of, term_rows
-from thsa_cosim.report.page.responses import set_colour
+from thsa_cosim.report.page.gains import limits_of, term_label, term_rows
+from thsa_cosim.report.page.responses import set_colours
 from thsa_cosim.report.page.text import count, number_cell, text_cell
 
 CHECK = "schedule_check.csv"
@@ -85,21 +85,24 @@ def _check_figure(part: Part, result: Json, axis: str) -> Figure:
     rows = max(-(-len(wanted) // columns), 1)
     drawn = Chart(f"{part.prefix}sweep", rows=rows, columns=columns, row_height=190)
     name, unit = _axis(axis)
+    colours = set_colours(sets)
     for k, requirement in enumerate(wanted):
         at, metric = divmod(k, columns), requirement["metric"]
         upper = "maximum" in requirement
-        for rank, (label, terms) in enumerate(sets.items()):
+        for label, terms in sets.items():
             values = np.abs(terms[metric]) if metric == "steady_state_error" else terms[metric]
             x = np.unique(places[label])
             worst = np.nanmax if upper else np.nanmin
             y = [float(worst(values[places[label] == one])) for one in x]
-            colour = chart.AFTER if label == "schedule" else set_colour(label, rank)
-            drawn.line(x, y, label, at=at, colour=colour, width=1.8)
+            drawn.line(x, y, label, at=at, colour=colours[label], width=1.8)
         drawn.level(requirement["maximum" if upper else "minimum"], at=at)
-        drawn.title(f"{metric.replace('_', ' ')} {limits_of(result)[metric]}", *at)
+        shown = "" if requirement["unit"] == "1" else f" {requirement['unit']}"
+        drawn.title(f"{term_label(metric)} {limits_of(result)[metric]}{shown}", *at)
+        below = k + columns >= len(wanted)
         drawn.axes(
-            *at, y=f"[{requirement['unit']}]", x=f"{name} [{unit}]" if k + columns >= len(wanted) else ""
+            *at, y=f"{term_label(metric)} [{requirement['unit']}]", x=f"{name} [{unit}]" if below else ""
         )
+        drawn.axes(*at, log_y=metric == "steady_state_error", dtick_y=1)
     return drawn.build(
         "The sweep between the nodes: required terms, worst over the other conditions; dotted: the limit."
     )
@@ -140,4 +143,4 @@ def _check_table(result: Json, check: Json) -> Table:
     ]
     rows += term_rows(result, {name: s["worst"] for name, s in sets.items()}, sets)
     title = f"The sweep between the nodes: worst of {count(check['conditions'], 'condition')}"
-    return Table(title, columns, rows, "Marked red: beyond the limit somewhere in the sweep.")
+    return Table(title, columns, rows, "Red: beyond the limit somewhere in the sweep.")

@@ -4,7 +4,9 @@ from thsa_cosim.report.page.comparison import MET, MISSED, noise_ratio, ratio_ma
 from thsa_cosim.report.page.content import Block, Cell, Column, Facts, Section, Table, Text
 from thsa_cosim.report.page.failures import evaluations, failed
 from thsa_cosim.report.page.folder import Json, Part, Study
+from thsa_cosim.report.page.gains import term_label
 from thsa_cosim.report.page.text import (
+    DASH,
     count,
     degrees,
     listing,
@@ -12,6 +14,7 @@ from thsa_cosim.report.page.text import (
     percent,
     plus_minus,
     quantity,
+    significant_cell,
     text_cell,
 )
 from thsa_cosim.report.tables import number
@@ -110,32 +113,33 @@ def _found_table(result: Json) -> Table:
     points: list[Json] = result["points"]
     laws: Json = result.get("laws", {})
     names = list(dict.fromkeys(n for p in points for n in p["parameters"]))
-    columns = [Column("parameter", numeric=False), Column("unit", numeric=False)]
-    several = len(points) > 1
-    columns += (
-        [Column("coldest"), Column("value there"), Column("warmest"), Column("there")]
-        if several
-        else [Column("value")]
-    )
+    own = {name: [p for p in points if name in p["parameters"]] for name in names}
+    ends = {name: (found[0], found[-1])[: len(found)] for name, found in own.items()}
+    # Where all parameters have the same coldest and warmest point, the headings say which.
+    shared = {tuple(p["temperature_degC"] for p in found) for found in ends.values()}
+    headings = [degrees(t) for t in next(iter(shared))] if len(shared) == 1 else ["coldest", "warmest"]
+    columns = [Column("parameter", numeric=False), Column("unit", numeric=False), *map(Column, headings)]
     if laws:
         columns += [Column("law", numeric=False), Column("points from published")]
     rows = []
     for name in names:
-        own = [p for p in points if name in p["parameters"]]
-        row = [text_cell(name), text_cell(own[0]["parameters"][name]["unit"])]
-        for point in (own[0], own[-1]) if several else own:
-            estimate = point["parameters"][name]
-            if several:
-                row.append(Cell(degrees(point["temperature_degC"]), point["temperature_degC"]))
-            mark = "" if estimate["identifiable"] else "bad"
-            row.append(Cell(plus_minus(estimate["value"], estimate["stderr"]), estimate["value"], mark))
+        row = [text_cell(name), text_cell(own[name][0]["parameters"][name]["unit"])]
+        row += [_estimate(p, name, with_place=len(shared) > 1) for p in ends[name]]
+        row += [Cell(DASH)] * (len(headings) - len(ends[name]))
         if laws:
             law = laws.get(name, {})
             away = (law.get("largest_deviation") or {}).get("points")
-            row += [text_cell(law.get("form", "–")), Cell(percent(away), away)]
+            row += [text_cell(law.get("form", DASH)), Cell(percent(away), away)]
         rows.append(row)
     note = "Red: not determined by the data." if any(c.mark == "bad" for r in rows for c in r) else ""
     return Table("What came out: values ± one standard error", columns, rows, note)
+
+
+def _estimate(point: Json, name: str, with_place: bool) -> Cell:
+    estimate = point["parameters"][name]
+    place = f" at {degrees(point['temperature_degC'])}" if with_place else ""
+    text = plus_minus(estimate["value"], estimate["stderr"]) + place
+    return Cell(text, estimate["value"], "" if estimate["identifiable"] else "bad")
 
 
 def _tuned(result: Json) -> list[Block]:
@@ -181,7 +185,7 @@ def _tuned(result: Json) -> list[Block]:
         )
         rows += [
             (
-                text_cell(n.replace("_", " ")),
+                text_cell(term_label(n)),
                 text_cell(term_units.get(n, "")),
                 number_cell(before.get(n)),
                 number_cell(after[n]),
@@ -198,14 +202,14 @@ def _errors(study: Study) -> Table | None:
     for role, name, error in _all_errors(study):
         ratio = noise_ratio(error)
         share = error.get("nrmse")
-        cells = (number_cell(error["rmse"], 3), number_cell(error.get("noise"), 3))
+        cells = (significant_cell(error["rmse"]), significant_cell(error.get("noise")))
         rows.append(
             (
                 text_cell({"fit": "fitted", "validate": "held out"}.get(role, role)),
                 text_cell(name),
                 text_cell(error["unit"]),
                 *cells,
-                number_cell(ratio, 3, ratio_mark(ratio)),
+                significant_cell(ratio, 3, ratio_mark(ratio)),
                 Cell(percent(share), share),
             )
         )
@@ -258,6 +262,11 @@ def _sure(study: Study) -> list[str]:
             sentences.append(f"{what}: a little is left that the model does not explain.")
         else:
             sentences.append(f"{what}: the model lacks something, and the errors given are then too small.")
+    groups = result.get("groups", [])
+    if groups:
+        open_ended = [g for g in groups if not str(g["stopped"]).startswith("converged")]
+        ended = f"{len(groups) - len(open_ended)} of {count(len(groups), 'search', 'searches')} converged"
+        sentences.append(f"{ended}{'; more generations may find better gains' if open_ended else ''}.")
     done = sum(evaluations(part) for part in study.parts)
     broken = sum(sum(failed(part).values()) for part in study.parts)
     if done:

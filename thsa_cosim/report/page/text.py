@@ -1,6 +1,7 @@
 """Numbers as text: values with their errors, shares, durations, lists of names."""
 
 import math
+import re
 from collections.abc import Sequence
 
 from thsa_cosim.report.page.content import Cell
@@ -44,13 +45,33 @@ def listing(names: Sequence[str], most: int = 6) -> str:
 
 def degrees(temperature: float | None) -> str:
     """``−30 °C``, or ``all temperatures`` for a point that has none."""
-    return "all temperatures" if temperature is None else f"{number(temperature)} °C".replace("-", "−")
+    if temperature is None:
+        return "all temperatures"
+    tenths = round(temperature, 1) + 0.0  # no −0
+    return f"{tenths:g} °C".replace("-", "−")
+
+
+def search_label(label: str) -> str:
+    """A point's or group's own label, such as ``-30 degC``, as it is shown."""
+    return re.sub(r"(?<!\w)-(?=\d)", "−", label).replace(" degC", " °C")
+
+
+def significant(value: float | None, digits: int) -> str:
+    """A number with exactly ``digits`` significant digits (``1.00``), so that columns line up."""
+    if value is None or not math.isfinite(value):
+        return DASH
+    return f"{value:#.{digits}g}".rstrip(".")
 
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
     """``0.45 A``; a number without unit stands alone."""
     text = number(value, digits)
     return text if unit in ("", "1") or text == DASH else f"{text} {unit}"
+
+
+def significant_cell(value: float | None, digits: int = 3, mark: str = "") -> Cell:
+    """A cell with a number of exactly ``digits`` digits."""
+    return Cell(significant(value, digits), value, mark)
 
 
 def number_cell(value: float | None, digits: int = 4, mark: str = "") -> Cell:

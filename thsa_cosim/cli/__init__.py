@@ -3,7 +3,7 @@
 ``main``      the group of all commands, errors as one sentence, exit codes
 ``options``   what the study commands share: their options, where a study goes, how it ends
 ``models``    export, check
-``identify``, ``tune``, ``simulate``: one module a command
+``identify``, ``tune``, ``simulate``, ``report``: one module a command
 
 A command imports the heavy rooms itself, when it runs. To add a command: write it in a module of its own and
 name it in ``main.COMMANDS``.

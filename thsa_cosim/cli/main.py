@@ -14,12 +14,13 @@ from thsa_cosim import __version__
 from thsa_cosim.cli.identify import identify
 from thsa_cosim.cli.models import check, export
 from thsa_cosim.cli.options import Interrupted
+from thsa_cosim.cli.report import report
 from thsa_cosim.cli.simulate import simulate
 from thsa_cosim.cli.tune import tune
 from thsa_cosim.errors import ThsaCosimError, did_you_mean
 
 #: In the order in which a newcomer meets them; help lists them so.
-COMMANDS: tuple[click.Command, ...] = (export, check, simulate, identify, tune)
+COMMANDS: tuple[click.Command, ...] = (export, check, simulate, identify, tune, report)
 
 
 class _Cli(click.Group):

@@ -1,3 +1,66 @@
-"""FMU-based co-simulation toolkit that identifies and tunes electromechanical actuators."""
+"""FMU-based co-simulation toolkit that identifies and tunes electromechanical actuators.
+
+``identify``, ``tune``, ``simulate`` and ``open_study`` are for notebooks and scripts (``thsa_cosim.api``); each is
+imported when it is first used. The rooms below have an ``__init__`` that says what is in them.
+"""
+
+import sys
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from thsa_cosim.api import (
+        DiagnoseStudy,
+        IdentifyStudy,
+        SimulateStudy,
+        Study,
+        TuneStudy,
+        identify,
+        open_study,
+        simulate,
+        tune,
+    )
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "DiagnoseStudy",
+    "IdentifyStudy",
+    "SimulateStudy",
+    "Study",
+    "TuneStudy",
+    "__version__",
+    "identify",
+    "open_study",
+    "simulate",
+    "tune",
+]
+
+
+class _Lazy:
+    """A name of ``thsa_cosim.api``, imported when it is asked for.
+
+    A data descriptor on the module's class, because importing the submodule ``thsa_cosim.identify`` sets the
+    package's attribute of that name, which would hide the function: it is set in vain here.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __get__(self, module: ModuleType | None, owner: type[ModuleType]) -> Any:
+        from thsa_cosim import api
+
+        return getattr(api, self._name)
+
+    def __set__(self, module: ModuleType, value: object) -> None:
+        """Leave the name as it is."""
+
+
+class _Package(ModuleType):
+    """This package with its lazy names."""
+
+
+for _name in __all__:
+    if _name != "__version__":
+        setattr(_Package, _name, _Lazy(_name))
+sys.modules[__name__].__class__ = _Package

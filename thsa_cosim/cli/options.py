@@ -1,8 +1,6 @@
 """What the study commands share: their options, where a study goes, and how it ends."""
 
-import datetime
 import functools
-import os
 import shlex
 import sys
 from collections.abc import Callable, Mapping
@@ -12,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypedDict
 
 import click
 
+from thsa_cosim.api import cores, default_folder
 from thsa_cosim.errors import InputError
 
 if TYPE_CHECKING:
@@ -129,22 +128,8 @@ class Interrupted(Exception):
         super().__init__(shlex.join(["thsa-cosim", *arguments]))
 
 
-def cores() -> int:
-    """Number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def default_folder(scenario: Path, suffix: str = "") -> Path:
-    """``studies/<scenario>-<date>``: the same command on the same day continues the same study."""
-    return Path("studies") / f"{scenario.stem}{suffix}-{datetime.date.today().isoformat()}"
-
-
 def console(*, stderr: bool = False) -> "Console":
     """Return a console for stdout or stderr; in a pipe it is plain and wide."""
-    from rich.console import Console
+    from thsa_cosim.report.progress import console as open_console  # rich takes its time to import
 
-    found = Console(stderr=stderr)
-    # A pipe has no width; 80 columns would fold every table.
-    return found if found.is_terminal else Console(stderr=stderr, width=140)
+    return open_console(stderr=stderr)

@@ -10,13 +10,14 @@ from thsa_cosim.cli.options import StudyOptions, study_options
 def simulate(options: StudyOptions) -> None:
     """Run SCENARIO once per recording and compare; parameters to be identified keep their start values."""
     from thsa_cosim.identify import open_study, study_identity
+    from thsa_cosim.report.study import RESULT, write_simulate
     from thsa_cosim.report.tables import print_simulate
     from thsa_cosim.scenario import load_scenario
-    from thsa_cosim.simulate import RESULT
     from thsa_cosim.simulate import simulate as run
 
     loaded = load_scenario(options.scenario, **options.overrides)
     place = options.place("" if loaded.kind == "simulate" else "-simulate")
     open_study(place["folder"], {**study_identity(loaded), "kind": "simulate"})
     result = run(loaded, **place)
-    options.conclude(place["folder"] / RESULT, len(result.files), lambda out: print_simulate(out, result))
+    files = write_simulate(result, place["folder"])
+    options.conclude(place["folder"] / RESULT, len(files), lambda out: print_simulate(out, result))

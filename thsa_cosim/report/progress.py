@@ -16,6 +16,13 @@ LINE_EVERY = 10.0
 BAR_EVERY = 0.1
 
 
+def console(*, stderr: bool = False) -> Console:
+    """A console for stdout or stderr; in a pipe it is plain and wide."""
+    found = Console(stderr=stderr)
+    # A pipe has no width; 80 columns would fold every table.
+    return found if found.is_terminal else Console(stderr=stderr, width=140)
+
+
 class ProgressDisplay:
     """A context manager that is called with every ``Progress``; ``quiet`` shows nothing at all."""
 

@@ -1,0 +1,26 @@
+"""For notebooks and scripts: run a scenario or open a study folder, get tables (pandas) and figures (matplotlib).
+
+``run``      identify, tune, simulate: a scenario in, a study out
+``study``    what a study folder says, one class a kind
+``figures``  its plots
+
+``import thsa_cosim as tc`` offers all of it as ``tc.identify(...)`` and so on. A study is read from its folder, so
+that one that was run elsewhere opens as one that has just been run.
+"""
+
+from thsa_cosim.api.run import cores, default_folder, identify, simulate, tune
+from thsa_cosim.api.study import DiagnoseStudy, IdentifyStudy, SimulateStudy, Study, TuneStudy, open_study
+
+__all__ = [
+    "DiagnoseStudy",
+    "IdentifyStudy",
+    "SimulateStudy",
+    "Study",
+    "TuneStudy",
+    "cores",
+    "default_folder",
+    "identify",
+    "open_study",
+    "simulate",
+    "tune",
+]

@@ -1,0 +1,377 @@
+"""What a study folder says, as tables and figures: one class a kind of study."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from thsa_cosim.errors import InputError, did_you_mean
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from thsa_cosim.api.figures import Drawing
+    from thsa_cosim.laws import Law
+    from thsa_cosim.report.signal_files import SignalFile
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A finished or interrupted study; ``result`` is the content of its result.json.
+
+    Tables are pandas objects; units stand in a column ``unit`` or in brackets behind a name.
+    """
+
+    folder: Path
+    result: Mapping[str, Any]
+
+    @property
+    def kind(self) -> str:
+        """``identify``, ``tune``, ``simulate`` or ``diagnose``."""
+        return str(self.result["kind"])
+
+    @property
+    def title(self) -> str:
+        """The scenario's title."""
+        return str(self.result.get("title") or self.folder.name)
+
+    @property
+    def status(self) -> str:
+        """``complete`` or ``interrupted``; the same call continues an interrupted study."""
+        return str(self.result["status"])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the numbers should know."""
+        return tuple(self.result.get("notes", ()))
+
+    @property
+    def failures(self) -> "pd.Series[int]":
+        """Failed simulations by reason."""
+        import pandas as pd
+
+        return pd.Series(dict(self.result.get("failures", {})), dtype="int64", name="simulations")
+
+    @property
+    def recordings(self) -> "pd.DataFrame":
+        """How well each signal is met: index role, recording, signal; rmse and noise in ``unit``.
+
+        ``rmse / noise`` is 1 where only the sensor's noise is left; ``nrmse`` is relative to the measured range.
+        """
+
+        rows = {
+            (part["role"], part["name"], signal): {
+                "rmse": error["rmse"],
+                "noise": error["noise"],
+                "rmse / noise": error["rmse"] / error["noise"] if error["noise"] else np.nan,
+                "nrmse": error["nrmse"],
+                "unit": error["unit"],
+            }
+            for part in self._parts("recordings")
+            for signal, error in part["error"].items()
+        }
+        return _frame(rows, ["role", "recording", "signal"])
+
+    def signals(self, recording: str) -> "pd.DataFrame":
+        """Signals of a recording: index time [s], columns (signal [unit], measured or simulated).
+
+        Raises InputError for a recording that the study does not hold.
+        """
+        import pandas as pd
+
+        found = self._file(recording)
+        columns = {
+            (f"{name} [{found.units.get(name, '1')}]", variant): values
+            for name, variants in found.channels.items()
+            for variant, values in variants.items()
+        }
+        frame = pd.DataFrame(columns, index=pd.Index(found.time, name="time [s]"))
+        frame.columns = frame.columns.set_names(["signal", "source"])
+        return frame
+
+    @property
+    def journal(self) -> "pd.DataFrame":
+        """Every vector that was evaluated, in order; empty for a study without a search."""
+        import pandas as pd
+
+        files = sorted({*self.folder.glob("journal.csv"), *self.folder.glob("*/journal.csv")})
+        return pd.concat([pd.read_csv(file) for file in files]) if files else pd.DataFrame()
+
+    @property
+    def plots(self) -> tuple[str, ...]:
+        """What :meth:`plot` can draw; the first is its default."""
+        return (*self._drawings(), *self._files)
+
+    def plot(self, what: str | None = None) -> "Drawing":
+        """Draw one of ``plots``, or a recording by its name; return a matplotlib figure.
+
+        Raises InputError if there is nothing of that name.
+        """
+        from thsa_cosim.api import figures
+
+        known = self.plots
+        if not known:
+            raise InputError(f"{self.folder}: the study holds nothing to draw; let it finish first.")
+        name = known[0] if what is None else what
+        if name in self._drawings():
+            return self._drawings()[name]()
+        if name in self._files:
+            return figures.recording(self._files[name])
+        hint = did_you_mean(name, known) or f" There are {', '.join(known)}."
+        raise InputError(f"{self.folder}: there is no plot {name!r}.{hint}")
+
+    def report(self) -> Path:
+        """Write the study's HTML page; return its path."""
+        from thsa_cosim.report.page import write_page
+
+        return write_page(self.folder)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.title!r}, {self.status}, in {str(self.folder)!r}>"
+
+    def _parts(self, key: str) -> list[Any]:
+        """The entries of a list in result.json, of all stages."""
+        stages = self.result.get("stages", {}).values()
+        return [entry for part in (stages or (self.result,)) for entry in part.get(key, [])]
+
+    def _drawings(self) -> Mapping[str, Callable[[], "Drawing"]]:
+        return {}
+
+    @cached_property
+    def _files(self) -> Mapping[str, "SignalFile"]:
+        """Files of signals by the recording's name; with its role where two share a name."""
+        from thsa_cosim.report.signal_files import read_signals, signal_paths
+
+        folders = [self.folder, *sorted(p.parent for p in self.folder.glob("*/signals"))]
+        found = [read_signals(path) for folder in folders for path in signal_paths(folder)]
+        names = [file.name for file in found]
+        return {f.name if names.count(f.name) == 1 else f"{f.role}/{f.name}": f for f in found}
+
+    def _file(self, recording: str) -> "SignalFile":
+        if recording not in self._files:
+            hint = did_you_mean(recording, self._files) or f" It holds {', '.join(self._files) or 'none'}."
+            raise InputError(f"{self.folder}: the study holds no recording {recording!r}.{hint}")
+        return self._files[recording]
+
+
+class IdentifyStudy(Study):
+    """What an identification found."""
+
+    @property
+    def parameters(self) -> "pd.DataFrame":
+        """Index temperature [degC] (or the point's label) and parameter; value and stderr in ``unit``.
+
+        ``identifiable`` is False, with a ``reason``, where the recordings do not determine the value.
+        """
+
+        wanted = ("value", "stderr", "unit", "identifiable", "reason", "lower", "upper")
+        rows = {
+            (_where(point), name): {key: estimate.get(key, "") for key in wanted}
+            for point in self.result["points"]
+            for name, estimate in point["parameters"].items()
+        }
+        return _frame(rows, ["point", "parameter"])
+
+    @property
+    def laws(self) -> "pd.DataFrame":
+        """Index parameter; form, coefficients (from α0 up, or α1, β1, α2, β2), published ones, deviation."""
+        import pandas as pd
+
+        rows = {
+            name: {
+                "unit": law["unit"],
+                "form": law["form"],
+                "coefficients": tuple(law["coefficients"]),
+                "published": tuple((law.get("published") or {}).get("coefficients", ())),
+                "largest deviation": (law.get("largest_deviation") or {}).get("law", np.nan),
+                "identifiable": law["identifiable"],
+            }
+            for name, law in self.result["laws"].items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
+
+    def law(self, parameter: str) -> "Law":
+        """Return the fitted law: call it with degC; InputError if the parameter has none."""
+        from thsa_cosim.laws import Law
+
+        laws = self.result["laws"]
+        if parameter not in laws:
+            raise InputError(f"{self.folder}: {parameter!r} has no law.{did_you_mean(parameter, laws)}")
+        content = laws[parameter]
+        covariance = content.get("covariance")
+        return Law(
+            content["form"],
+            tuple(content["coefficients"]),
+            tuple(content.get("knots", ())),
+            None if covariance is None else np.array(covariance, dtype=np.float64),
+        )
+
+    def _drawings(self) -> Mapping[str, Callable[[], "Drawing"]]:
+        from thsa_cosim.api import figures
+
+        found: dict[str, Callable[[], Drawing]] = {}
+        if self.result["laws"]:
+            found["laws"] = lambda: figures.laws(self, list(self.result["laws"]))
+            for name in self.result["laws"]:
+                found[name] = lambda name=name: figures.laws(self, [name])  # type: ignore[misc]
+        if searches := {
+            str(point["label"]): [g["best_cost"] * _per_sample(point) for g in point["generations"]]
+            for point in self._parts("points")
+            if point.get("generations")
+        }:
+            found["convergence"] = lambda: figures.convergence(searches, "best cost per sample [1]")
+        return found
+
+
+class TuneStudy(Study):
+    """What a tuning found."""
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the gains keep every hard requirement."""
+        return bool(self.result["feasible"])
+
+    @property
+    def parameters(self) -> "pd.DataFrame":
+        """The gains: index parameter; value after and before, unit."""
+        import pandas as pd
+
+        before = (self.result["before"] or {}).get("gains", {})
+        rows = {
+            name: {"value": value, "before": before.get(name, np.nan), "unit": self.result["units"][name]}
+            for name, value in self.result["gains"].items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
+
+    @property
+    def terms(self) -> "pd.DataFrame":
+        """Terms of cost and requirements: one row a term, one column a set of gains, then its unit."""
+        import pandas as pd
+
+        sets = {"before": self.result["before"], **self.result["compare"], "after": self.result["after"]}
+        units = {"cost": "1", **self.result["term_units"]}
+        columns: dict[str, Any] = {
+            name: {term: found.get(term, np.nan) for term in units} for name, found in sets.items() if found
+        }
+        return pd.DataFrame({**columns, "unit": units}).rename_axis("term")
+
+    @property
+    def schedule(self) -> "pd.DataFrame":
+        """Gains over the conditions, one row a node; empty if none was asked for."""
+        import pandas as pd
+
+        return pd.DataFrame(self.result.get("schedule") or [])
+
+    @property
+    def plots(self) -> tuple[str, ...]:
+        """What :meth:`plot` can draw: the schedule, if there is one, responses by their condition, the search."""
+        own = self._drawings()
+        return (*(n for n in own if n == "schedule"), *self._files, *(n for n in own if n != "schedule"))
+
+    def _drawings(self) -> Mapping[str, Callable[[], "Drawing"]]:
+        from thsa_cosim.api import figures
+
+        found: dict[str, Callable[[], Drawing]] = {}
+        if len(self.result.get("schedule") or ()) > 1:
+            found["schedule"] = lambda: figures.schedule(self)
+        if searches := {
+            str(g["label"]): [c if c is not None and c < _INFEASIBLE else np.nan for c in g["best_cost"]]
+            for g in self.result["groups"]
+        }:
+            found["convergence"] = lambda: figures.convergence(searches, "best cost [1]")
+        return found
+
+
+class SimulateStudy(Study):
+    """How well an FMU follows recordings as it is."""
+
+
+class DiagnoseStudy(Study):
+    """Which effect a recording shows that the model does not have."""
+
+    @property
+    def verdict(self) -> str:
+        """``missing-effect``, ``no-missing-effect`` or ``unexplained-structure``."""
+        return str(self.result["verdict"])
+
+    @property
+    def effects(self) -> "pd.DataFrame":
+        """Index effect and parameter; value and stderr in ``unit``, and the effect's probability."""
+
+        rows = {
+            (effect["name"], name): {
+                "value": estimate["value"],
+                "stderr": estimate.get("stderr"),
+                "unit": estimate["unit"],
+                "probability": effect.get("probability"),
+            }
+            for effect in self.result["effects"]
+            for name, estimate in effect["parameters"].items()
+        }
+        return _frame(rows, ["effect", "parameter"])
+
+    @property
+    def held_out(self) -> "pd.DataFrame":
+        """Errors of the recordings that no fit touched: index signal; rmse before and after, noise."""
+        import pandas as pd
+
+        before, after = (self.result[key].get("validate", {}) for key in ("before", "after"))
+        rows = {
+            signal: {
+                "before": error["rmse"],
+                "after": after.get(signal, {}).get("rmse", np.nan),
+                "noise": error["noise"],
+            }
+            for signal, error in before.items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("signal")
+
+
+_KINDS: Mapping[str, type[Study]] = {
+    "identify": IdentifyStudy,
+    "tune": TuneStudy,
+    "simulate": SimulateStudy,
+    "diagnose": DiagnoseStudy,
+}
+_INFEASIBLE = 1e9
+
+
+def open_study(folder: Path | str) -> Study:
+    """Open the study in ``folder``; its class follows from its kind.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no result (yet), or one that cannot be read.
+    """
+    path = Path(folder) / "result.json"
+    try:
+        result = json.loads(path.read_text(encoding="utf-8"))
+        kind = _KINDS[result["kind"]]
+    except OSError as error:
+        raise InputError(
+            f"{folder} holds no result of a study ({error.strerror}); run its command first."
+        ) from None
+    except (ValueError, KeyError, TypeError):
+        raise InputError(f"{path} is no result of this version; repeat the study's command.") from None
+    return kind(Path(folder), result)
+
+
+def _frame(rows: Mapping[tuple[Any, ...], Any], names: list[str]) -> "pd.DataFrame":
+    import pandas as pd
+
+    index = pd.MultiIndex.from_tuples(list(rows) or [("",) * len(names)], names=names)
+    return pd.DataFrame(list(rows.values()), index=index if rows else index[:0])
+
+
+def _where(point: Mapping[str, Any]) -> Any:
+    temperature = point["temperature_degC"]
+    return point.get("label", "all") if temperature is None else temperature
+
+
+def _per_sample(point: Mapping[str, Any]) -> float:
+    return float(point["cost_per_sample"] / point["cost"]) if point.get("cost") else 1.0

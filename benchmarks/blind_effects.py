@@ -174,7 +174,7 @@ def position_friction(random: Random, rig: Rig) -> Draft:
             "position-friction",
             "slope",
             lambda a: {"slope_nut": way * 20.0 * a * rig.F_fn},
-            5.0,
+            3.0,
             _signed("slope_nut", "N/m"),
         )
     place, width = random.uniform(2e-3, 8e-3), random.uniform(1e-3, 3e-3)
@@ -232,7 +232,7 @@ def friction_run_in(random: Random, rig: Rig) -> Draft:
             "friction-run-in",
             "nut",
             lambda a: {"run_in_nut": 0.3 * a * rig.F_fn, "run_in_nut_distance": distance},
-            8.0,
+            4.0,
             _one("run_in_nut_distance", "m", "distance", "length"),
         )
     angle = log_uniform(random, 5.0, 30.0)
@@ -240,7 +240,7 @@ def friction_run_in(random: Random, rig: Rig) -> Draft:
         "friction-run-in",
         "gearbox",
         lambda a: {"run_in_gear": 0.1 * a * rig.T_fg, "run_in_gear_angle": angle},
-        8.0,
+        5.0,
     )
 
 
@@ -251,7 +251,7 @@ def current_sensor_gain(random: Random, rig: Rig) -> Draft:
         "current-sensor-gain",
         "in the loop",
         lambda a: {"current_gain": 1.0 + 0.03 * way * a},
-        10.0,
+        5.0,
         _signed("current_gain", "1", "gain"),
     )
 

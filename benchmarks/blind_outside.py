@@ -44,7 +44,7 @@ def dwell_friction(random: Random, rig: Rig) -> Draft:
         "dwell-friction",
         "age of the contact",
         lambda a: {"dwell": rig.F_fn * a, "dwell_time": time, "dwell_slip": slip},
-        10.0,
+        3.0,
     )
 
 

@@ -98,6 +98,11 @@ def overall(visibility: Mapping[str, float]) -> float:
     return max(_COUNTS[name] * value for name, value in visibility.items())
 
 
+def strength_of(visibility: float) -> str:
+    """The strength that an effect reached, which its largest plausible amplitude may keep below the one asked for."""
+    return [name for name, (low, _) in STRENGTHS.items() if name == "weak" or visibility > 0.95 * low][-1]
+
+
 def fitted(draft: Draft, target: float, visibility: Visibility, tries: int = 12) -> Present:
     """The amplitude at which `draft` reaches `target`, to 5 %, or its largest plausible one."""
     low, high, amplitude = 0.0, 2.0 * draft.most, 1.0
@@ -128,8 +133,8 @@ def generate_unit(
 ) -> dict[str, object]:
     """Write fit_1, fit_2, validate_1 and validate_2 .parquet into `folder`; the truth comes back as a label.
 
-    Each of `names` (keys of EFFECTS; none: a clean unit) gets `strength` (a key of STRENGTHS). Equal arguments
-    give equal files; the seed alone decides the temperature in degC unless it is given.
+    Each of `names` (keys of EFFECTS; none: a clean unit) gets `strength` (a key of STRENGTHS) where it can; the
+    label's is the one reached. Equal arguments give equal files; `temperature` in degC is drawn unless given.
     """
     random = np.random.default_rng(
         [seed, zlib.crc32("+".join(names).encode()), zlib.crc32(strength.encode())]
@@ -152,7 +157,7 @@ def generate_unit(
         )
     return {
         "effects": [effect.label() for effect in present],
-        "strength": strength if names else "none",
+        "strength": strength_of(min(overall(e.visibility) for e in present)) if present else "none",
         "seed": seed,
         "temperature_degC": temperature,
         "rig": rig._asdict(),

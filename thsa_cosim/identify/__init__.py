@@ -7,14 +7,17 @@
 ``evaluate``          vectors → simulations → costs, with the journal
 ``over_temperature``  points → laws
 ``compare``           simulated against measured
+``force``             the force residual
 ``study``             the study folder
 ``results``           what comes out
 """
 
+from thsa_cosim.identify.force import force_balance
 from thsa_cosim.identify.results import (
     ChannelError,
     Comparison,
     Estimate,
+    ForceBalance,
     IdentifyResult,
     LawResult,
     PointResult,
@@ -27,11 +30,13 @@ __all__ = [
     "ChannelError",
     "Comparison",
     "Estimate",
+    "ForceBalance",
     "IdentifyResult",
     "LawResult",
     "PointResult",
     "Progress",
     "describe",
+    "force_balance",
     "identify",
     "open_study",
     "study_identity",

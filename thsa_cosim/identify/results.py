@@ -63,6 +63,20 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class ForceBalance:
+    """Force residual below ``band`` Hz: its rms in ``unit`` by role, over all recordings of the role.
+
+    ``repeatability``: standard deviation between laps, in ``unit``, which no law of the motion can undercut; NaN
+    where no recording has two laps.
+    """
+
+    unit: str
+    band: float
+    rms: Mapping[str, float]
+    repeatability: float
+
+
+@dataclass(frozen=True)
 class PointResult:
     """What was found at one temperature.
 
@@ -128,6 +142,7 @@ class IdentifyResult:
     """The identified laws (or single values) as start values in the FMU's units."""
     notes: tuple[str, ...] = ()
     settings: Mapping[str, object] = field(default_factory=dict)
+    force: ForceBalance | None = None
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,20 @@ from thsa_cosim.batch import Experiment, Job, Journal, Runner
 from thsa_cosim.errors import InputError, StudyError
 from thsa_cosim.identify.compare import compare, summarise
 from thsa_cosim.identify.evaluate import Evaluator, Reply, Request, residual_experiment, terms_experiment
+from thsa_cosim.identify.force import force_balance
 from thsa_cosim.identify.interleave import interleave
 from thsa_cosim.identify.over_temperature import fit_laws, values_at
 from thsa_cosim.identify.parameter_set import parameter_set
 from thsa_cosim.identify.point import PointSearch, search_point
 from thsa_cosim.identify.problem import Case, Given, PointProblem, build_case, build_point
-from thsa_cosim.identify.results import Comparison, IdentifyResult, LawResult, PointResult, Progress
+from thsa_cosim.identify.results import (
+    Comparison,
+    ForceBalance,
+    IdentifyResult,
+    LawResult,
+    PointResult,
+    Progress,
+)
 from thsa_cosim.identify.study import describe, open_study
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario, open_runner
@@ -155,6 +163,7 @@ class _Study:
             for k, found in sorted(self._found.items())
             if found.result is None
         ]
+        force, unsaid = self._force(comparisons, laws)
         return IdentifyResult(
             title=title,
             status="interrupted" if self.interrupted else "complete",
@@ -171,9 +180,29 @@ class _Study:
             evaluations=0 if evaluator is None else sum(evaluator.evaluations),
             failures={} if evaluator is None else evaluator.failures,
             parameter_set=identified,
-            notes=(*scenario.notes, *failed, *notes, *left_out, *self._notes),
+            notes=(*scenario.notes, *failed, *notes, *left_out, *self._notes, *unsaid),
             settings={**asdict(scenario.search), "error": scenario.cost.error},
+            force=force,
         )
+
+    def _force(
+        self, comparisons: Sequence[Comparison], laws: Mapping[str, LawResult]
+    ) -> tuple[ForceBalance | None, list[str]]:
+        """The force residual, or a sentence why there is none."""
+        scenario = self._scenario
+        if scenario.force is None:
+            return None, []
+        space, results = scenario.parameters, self._results()
+        shared = [p.name for p in space.parameters]
+        masses = []
+        for comparison in comparisons:
+            values = values_at(comparison.temperature_degC, shared, results, laws, scenario.round_to)
+            found = {**scenario.fixed_for(comparison.recording), **space.assignments(values)}
+            masses.append(found.get(scenario.force.mass, scenario.force.mass_at_start))
+        try:
+            return force_balance(scenario.force, comparisons, masses), []
+        except ValueError as error:
+            return None, [f"there is no force residual: {error}"]
 
     def _results(self) -> list[PointResult]:
         results = []

@@ -4,6 +4,7 @@ import csv
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ def identify_to_dict(result: IdentifyResult) -> dict[str, Any]:
                 role: {channel: _error(error) for channel, error in channels.items()}
                 for role, channels in result.errors.items()
             },
+            **({} if result.force is None else {"force_residual": asdict(result.force)}),
             "recordings": [
                 {
                     "name": comparison.recording,

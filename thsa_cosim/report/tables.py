@@ -1,10 +1,12 @@
 """What the command line prints at the end of an identification (rich)."""
 
+import math
+
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from thsa_cosim.identify.results import ChannelError, IdentifyResult
+from thsa_cosim.identify.results import ChannelError, ForceBalance, IdentifyResult
 from thsa_cosim.simulate import ChannelFit, SimulateResult
 
 
@@ -20,6 +22,8 @@ def print_identify(console: Console, result: IdentifyResult) -> None:
     console.print(points_table(result))
     if any(result.errors.values()):
         console.print(errors_table(result))
+    if result.force is not None:
+        console.print(Text(force_sentence(result.force)), highlight=False)
     for note in result.notes:
         console.print(Text(f"note: {note}"), highlight=False)
 
@@ -91,6 +95,17 @@ def errors_table(result: IdentifyResult) -> Table:
         for name, error in channels.items():
             table.add_row(role, Text(name), *_error_cells(error))
     return table
+
+
+def force_sentence(force: ForceBalance) -> str:
+    """The force residual by role, beside what the laps differ by."""
+    by_role = ", ".join(f"{number(rms, 3)} {force.unit} ({role})" for role, rms in force.rms.items())
+    laps = (
+        ""
+        if math.isnan(force.repeatability)
+        else f"; laps differ by {number(force.repeatability, 2)} {force.unit}"
+    )
+    return f"Force residual below {force.band:g} Hz: {by_role}{laps}."
 
 
 def print_simulate(console: Console, result: SimulateResult) -> None:

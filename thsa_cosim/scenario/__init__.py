@@ -11,6 +11,7 @@ from thsa_cosim.scenario.load import load_scenario
 from thsa_cosim.scenario.model import (
     Channel,
     CostSpec,
+    ForceSpec,
     LawSpec,
     Scenario,
     SearchSpec,
@@ -27,6 +28,7 @@ __all__ = [
     "KINDS",
     "Channel",
     "CostSpec",
+    "ForceSpec",
     "LawSpec",
     "Scenario",
     "SearchSpec",

@@ -8,6 +8,7 @@ from pathlib import Path
 from thsa_cosim.errors import ParameterError, ScenarioError, UnitError, did_you_mean
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
+from thsa_cosim.scenario.model import ForceSpec
 from thsa_cosim.scenario.schema import CommonTable, IdentifyTable, ParameterTable, SimulateTable
 from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.ssv import read_ssv
@@ -115,6 +116,24 @@ def parameters(table: IdentifyTable, fmu: FmuDescription) -> tuple[tuple[Paramet
             check_range(variable, value, f"parameters[{p.name}].{key_name}", fmu)
         found.append((replace(plain, description=p.description or variable.description), p.per))
     return tuple(found)
+
+
+def force(table: IdentifyTable, fmu: FmuDescription, measured: tuple[str, ...]) -> ForceSpec | None:
+    """Return what the force residual needs; ScenarioError if a signal is not measured or the mass no parameter."""
+    spec = table.force
+    if spec is None:
+        return None
+    for key in ("position", "force"):
+        name = getattr(spec, key)
+        if name not in measured:
+            raise ScenarioError(
+                f"force.{key}: {name!r} is no measured output; add [recordings.columns.{name}]."
+                f"{did_you_mean(name, measured)}"
+            )
+    mass = settable(fmu, spec.mass, "force.mass").start
+    if not isinstance(mass, float):
+        raise ScenarioError(f"force.mass: {spec.mass!r} of {fmu.path.name} has no number as its start value.")
+    return ForceSpec(**spec.model_dump(), mass_at_start=mass)
 
 
 def readable(fmu: FmuDescription, name: str, key: str) -> Variable:

@@ -154,6 +154,7 @@ def _resolve(
         simulation=_simulation(table),
         round_to=table.temperature.round_to if table.temperature else 1.0,
         zeroed=check.zeroed(table, description),
+        force=check.force(table, description, measured) if isinstance(table, IdentifyTable) else None,
     )
     if isinstance(table, IdentifyTable):
         for recording in scenario.fit:

@@ -47,6 +47,21 @@ class CostSpec:
 
 
 @dataclass(frozen=True)
+class ForceSpec:
+    """The force residual: measured outputs, the FMU parameter for the mass, ``band`` [Hz], ``period`` [s] of a lap.
+
+    ``mass_at_start`` is the parameter's value in the FMU, in its unit.
+    """
+
+    position: str
+    force: str
+    mass: str
+    mass_at_start: float
+    band: float
+    period: float | None = None
+
+
+@dataclass(frozen=True)
 class SearchSpec:
     """Differential evolution and what follows it; ``profile`` names parameters for a profile likelihood."""
 
@@ -121,6 +136,7 @@ class Scenario:
     round_to: float = 1.0
     zeroed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """FMU parameters that are 0 because of a parameter's ``zero`` or ``law_block``, by its name."""
+    force: ForceSpec | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -141,6 +157,11 @@ class Scenario:
                 f" give it as cost.channels.{channel}.noise."
             )
         return noise
+
+    def fixed_for(self, recording: str) -> Mapping[str, float]:
+        """Return the FMU start values (FMU units) of every run of a recording, by its name."""
+        own = (p.fixed for p in self.points if any(r.name == recording for r in (*p.fit, *p.validate)))
+        return next(own, self.fixed)
 
     def given(self, by_temperature: Mapping[float | None, Mapping[str, float]]) -> "Scenario":
         """Return the scenario with further FMU start values per temperature point (what an earlier stage found).

@@ -184,6 +184,25 @@ class SimulationTable(Table):
     """``"reset"`` keeps one FMU instance and resets it: only where ``thsa-cosim check`` found that right."""
 
 
+class ForceTable(Table):
+    """``[force]``: the force residual, an inverse-dynamics view beside the errors of the outputs.
+
+    What the model's forces lack to explain the measured motion, below ``band``: F_m − F_s − M (a_m − a_s), with
+    accelerations from the positions by zero-phase filters. The loops around the model do not blur it.
+    """
+
+    position: Name
+    """A measured output: the position, or the angle."""
+    force: Name
+    """A measured output: the force, or the torque, of the drive."""
+    mass: Name
+    """The FMU parameter that is the mass, or the inertia, which it moves."""
+    band: Positive = 20.0
+    """Hz."""
+    period: Positive | None = None
+    """s after which the motion repeats; what its laps differ by is printed beside the residual."""
+
+
 class CommonTable(Table):
     """Keys of every kind that runs an FMU against recordings."""
 
@@ -218,6 +237,7 @@ class IdentifyTable(CommonTable):
 
     parameters: list[ParameterTable] = Field(min_length=1)
     search: SearchTable = SearchTable()
+    force: ForceTable | None = None
 
 
 class StageTable(Table):

@@ -1,13 +1,12 @@
 """What a study folder says, as tables and figures: one class a kind of study."""
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from thsa_cosim.errors import InputError, did_you_mean
 
@@ -67,7 +66,7 @@ class Study:
             (part["role"], part["name"], signal): {
                 "rmse": error["rmse"],
                 "noise": error["noise"],
-                "rmse / noise": error["rmse"] / error["noise"] if error["noise"] else np.nan,
+                "rmse / noise": error["rmse"] / error["noise"] if error["noise"] else math.nan,
                 "nrmse": error["nrmse"],
                 "unit": error["unit"],
             }
@@ -187,7 +186,7 @@ class IdentifyStudy(Study):
                 "form": law["form"],
                 "coefficients": tuple(law["coefficients"]),
                 "published": tuple((law.get("published") or {}).get("coefficients", ())),
-                "largest deviation": (law.get("largest_deviation") or {}).get("law", np.nan),
+                "largest deviation": (law.get("largest_deviation") or {}).get("law", math.nan),
                 "identifiable": law["identifiable"],
             }
             for name, law in self.result["laws"].items()
@@ -196,6 +195,8 @@ class IdentifyStudy(Study):
 
     def law(self, parameter: str) -> "Law":
         """Return the fitted law: call it with degC; InputError if the parameter has none."""
+        import numpy as np
+
         from thsa_cosim.laws import Law
 
         laws = self.result["laws"]
@@ -242,7 +243,7 @@ class TuneStudy(Study):
 
         before = (self.result["before"] or {}).get("gains", {})
         rows = {
-            name: {"value": value, "before": before.get(name, np.nan), "unit": self.result["units"][name]}
+            name: {"value": value, "before": before.get(name, math.nan), "unit": self.result["units"][name]}
             for name, value in self.result["gains"].items()
         }
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
@@ -255,7 +256,7 @@ class TuneStudy(Study):
         sets = {"before": self.result["before"], **self.result["compare"], "after": self.result["after"]}
         units = {"cost": "1", **self.result["term_units"]}
         columns: dict[str, Any] = {
-            name: {term: found.get(term, np.nan) for term in units} for name, found in sets.items() if found
+            name: {term: found.get(term, math.nan) for term in units} for name, found in sets.items() if found
         }
         return pd.DataFrame({**columns, "unit": units}).rename_axis("term")
 
@@ -279,7 +280,7 @@ class TuneStudy(Study):
         if len(self.result.get("schedule") or ()) > 1:
             found["schedule"] = lambda: figures.schedule(self)
         if searches := {
-            str(g["label"]): [c if c is not None and c < _INFEASIBLE else np.nan for c in g["best_cost"]]
+            str(g["label"]): [c if c is not None and c < _INFEASIBLE else math.nan for c in g["best_cost"]]
             for g in self.result["groups"]
         }:
             found["convergence"] = lambda: figures.convergence(searches, "best cost [1]")
@@ -323,7 +324,7 @@ class DiagnoseStudy(Study):
         rows = {
             signal: {
                 "before": error["rmse"],
-                "after": after.get(signal, {}).get("rmse", np.nan),
+                "after": after.get(signal, {}).get("rmse", math.nan),
                 "noise": error["noise"],
             }
             for signal, error in before.items()

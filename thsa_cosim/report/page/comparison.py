@@ -96,7 +96,7 @@ def recording_folds(part: Part, signals: list[SignalFile]) -> list[Block]:
     signals = sorted(
         signals, key=lambda s: order.index((s.role, s.name)) if (s.role, s.name) in facts else len(order)
     )
-    scores = [_worst(found) for found in signals]
+    scores = [_score(found, facts.get((found.role, found.name), {}).get("error", {})) for found in signals]
     opened = int(np.argmax(scores)) if scores else 0
     folds: list[Block] = []
     for k, found in enumerate(signals):
@@ -109,8 +109,11 @@ def recording_folds(part: Part, signals: list[SignalFile]) -> list[Block]:
     return folds
 
 
-def _worst(found: SignalFile) -> float:
-    """How far the worst channel's last variant is from the measured one, relative to the measured range."""
+def _score(found: SignalFile, errors: Json) -> float:
+    """How badly a recording is met: the worst rmse over noise, else over the measured range."""
+    ratios = [ratio for error in errors.values() if (ratio := noise_ratio(error)) is not None]
+    if ratios:
+        return max(ratios)
     worst = 0.0
     for variants in found.channels.values():
         if "measured" in variants and len(variants) > 1:

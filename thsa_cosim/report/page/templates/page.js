@@ -36,11 +36,8 @@
     const figure = resolve(figures[place.id], styles);
     figure.layout.template = { layout: theme(styles) };
     drawn.add(place);
-    return Plotly.react(place, figure.data, figure.layout, {
-      responsive: true,
-      displaylogo: false,
-      modeBarButtonsToRemove: ["select2d", "lasso2d"],
-    });
+    const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
+    return Plotly.react(place, figure.data, figure.layout, options).then(() => { place.dataset.drawn = "yes"; });
   };
   const places = [...document.querySelectorAll(".plot")];
   const hidden = (place) => place.offsetWidth === 0;
@@ -49,8 +46,7 @@
   const drawNext = () => {
     const next = places.find((place) => !drawn.has(place) && !hidden(place));
     if (next) {
-      draw(next);
-      idle(drawNext);
+      draw(next).then(() => idle(drawNext));
     } else {
       root.dataset.drawn = "all";
     }

@@ -5,11 +5,14 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fuzzing.material import motor, samples
 from small_scenario import toml
 
 from thsa_cosim.cli import run_command
+from thsa_cosim.costs import rmse
+from thsa_cosim.recordings import Column, TimeAxis, read_recording
 
 ROOT = Path(__file__).parents[1]
 MOTOR = ROOT / "scenarios" / "motor.toml"
@@ -90,3 +93,15 @@ def test_a_cost_without_a_finite_value_names_its_channel(
     arguments = ["identify", str(scenario), "--fit", str(tmp_path / "tiny.csv"), "--workers", "1"]
     assert run_command([*arguments, "-o", str(tmp_path / "study")]) == 3
     assert "the cost of i_q is not finite" in capsys.readouterr().err
+
+
+def test_a_root_mean_square_of_huge_errors_is_no_overflow() -> None:
+    huge = np.array([1e200, -1e200])
+    assert rmse(np.zeros(2), huge) == pytest.approx(1e200)
+    assert rmse(huge, huge) == 0.0
+
+
+def test_samples_that_span_next_to_no_time(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("t,v\n0,1\n5e-324,2\n1e-323,3\n")
+    recording = read_recording(tmp_path / "run.csv", {"v": Column("v", "m/s")}, time=TimeAxis("t", "s"))
+    assert recording.signals.time.size == 3

@@ -91,7 +91,7 @@ def published_law(form: str, coefficients: Sequence[float]) -> Law:
 
 
 def fit_law(form: str, temperature: FloatArray, values: FloatArray, stderr: FloatArray | None = None) -> Law:
-    """Fit one form to ``values`` (n,) at ``temperature`` (n,) in degC, weighted by 1/``stderr``².
+    """Fit one form to ``values`` (n,) at ``temperature`` (n,) in degC, weighted by the inverse square of ``stderr``.
 
     Points whose ``stderr`` is missing or not positive count like the least sure of the others; without any
     ``stderr`` all count alike and the covariance is scaled by the scatter about the law. Raises InputError

@@ -38,7 +38,7 @@ def control_cost(
     """Equation 7 for ``response`` to ``command``, both (n,) in one unit, over ``time`` (n,) in s.
 
     ``scale`` divides the velocity error (the article works in mm/s: 1e-3 for signals in m/s), κ1 and κ2
-    weigh the rise time in s and |e_ss|; e_ss enters by its size, for its sign carries no merit (``signed``
+    weigh the rise time in s and e_ss; e_ss enters by its size, for its sign carries no merit (``signed``
     takes it as the article prints it, which rewards running too fast). The rise time is the first reach of
     ``fraction`` of the command's last value, counted from ``start``, or from the first reach of ``low``.
     """

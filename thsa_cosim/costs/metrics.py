@@ -14,7 +14,11 @@ def rmse(measured: FloatArray, simulated: FloatArray) -> float:
     """Root mean square of ``simulated - measured``, both (n,), in the signal's unit; NaN when n = 0."""
     if measured.size == 0:
         return float("nan")
-    return float(np.sqrt(np.mean((simulated - measured) ** 2)))
+    error = simulated - measured
+    largest = float(np.max(np.abs(error)))
+    if largest == 0.0 or not np.isfinite(largest):
+        return largest
+    return largest * float(np.sqrt(np.mean((error / largest) ** 2)))  # no overflow in the square
 
 
 def signal_range(measured: FloatArray) -> float:

@@ -72,7 +72,7 @@ def common_grid(path: Path, own: Mapping[str, FloatArray], axis: TimeAxis) -> Fl
     """Return the common time axis [s]: the finest one, over the span that all columns share, cut and resampled."""
     if not own:
         raise RecordingError(f"{path}: no column is read from it; name at least one.")
-    finest = max(own.values(), key=lambda t: t.size / (t[-1] - t[0]))
+    finest = min(own.values(), key=lambda t: (t[-1] - t[0]) / t.size)
     low = max(float(t[0]) for t in own.values())
     high = min(float(t[-1]) for t in own.values())
     low = low if axis.start is None else max(low, axis.start - axis.lead_in)

@@ -36,14 +36,17 @@ def identify(options: StudyOptions, export_fmu: bool | None) -> None:
     options.check_kind(loaded.kind, "identify")
     place = options.place()
     folder = place["folder"]
+    repeat = options.repeat("identify", folder)
     staged = not isinstance(loaded, Scenario)
     with ProgressDisplay(console(stderr=True), quiet=options.quiet) as display:
         done = (
-            _one(loaded, place, display) if isinstance(loaded, Scenario) else _stages(loaded, place, display)
+            _one(loaded, place, repeat, display)
+            if isinstance(loaded, Scenario)
+            else _stages(loaded, place, repeat, display)
         )
+    files, note = [*done.files, *options.page(folder)], ""
     if done.status == "interrupted":
-        raise Interrupted("identify", options, folder)
-    files, note = done.files, ""
+        raise Interrupted(repeat)
     if export_fmu or (export_fmu is None and staged):
         target = loaded.fmu if isinstance(loaded, Scenario) else loaded.stages[-1].scenario.fmu
         try:
@@ -71,20 +74,24 @@ class _Finished:
     show: Callable[["Console"], None]
 
 
-def _one(scenario: "Scenario", place: Place, on_progress: Callable[["Progress"], None]) -> _Finished:
+def _one(
+    scenario: "Scenario", place: Place, repeat: str, on_progress: Callable[["Progress"], None]
+) -> _Finished:
     from thsa_cosim.identify import identify as run
     from thsa_cosim.report.study import write_identify
     from thsa_cosim.report.tables import print_identify
 
-    result = run(scenario, **place, on_progress=on_progress)
+    result = run(scenario, **place, on_progress=on_progress, command=repeat)
     files = write_identify(result, place["folder"])
     return _Finished(files, result.status, result.parameter_set, lambda out: print_identify(out, result))
 
 
-def _stages(staged: "StagedScenario", place: Place, on_progress: Callable[["Progress"], None]) -> _Finished:
+def _stages(
+    staged: "StagedScenario", place: Place, repeat: str, on_progress: Callable[["Progress"], None]
+) -> _Finished:
     from thsa_cosim.report.staged import print_staged, write_staged
     from thsa_cosim.staged import run_stages
 
-    result = run_stages(staged, **place, on_progress=on_progress)
+    result = run_stages(staged, **place, on_progress=on_progress, command=repeat)
     files = write_staged(result, place["folder"])
     return _Finished(files, result.status, result.parameter_set, lambda out: print_staged(out, result))

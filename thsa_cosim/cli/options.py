@@ -2,7 +2,6 @@
 
 import functools
 import shlex
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypedDict
 import click
 
 from thsa_cosim.api import cores, default_folder
-from thsa_cosim.errors import InputError
+from thsa_cosim.errors import InputError, ThsaCosimError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -52,6 +51,7 @@ class StudyOptions:
     cluster: str | None
     quiet: bool
     as_json: bool
+    report: bool
 
     @property
     def overrides(self) -> Overrides:
@@ -65,6 +65,33 @@ class StudyOptions:
             "workers": self.workers or cores(),
             "cluster": self.cluster,
         }
+
+    def repeat(self, command: str, folder: Path) -> str:
+        """The command line that repeats the study, or continues it, with its folder spelt out."""
+        words = ["thsa-cosim", command, str(self.scenario)]
+        for option, given in (("--fit", self.fit), ("--validate", self.validate)):
+            words += [word for path in given for word in (option, str(path))]
+        others = {
+            "--seed": self.seed,
+            "--fmu": self.fmu,
+            "--workers": self.workers,
+            "--cluster": self.cluster,
+        }
+        for option, value in others.items():
+            words += [] if value is None else [option, str(value)]
+        return shlex.join([*words, "-o", str(folder)])
+
+    def page(self, folder: Path) -> list[Path]:
+        """Write the study's page unless that was declined; a disk that refuses it does not fail the study."""
+        from thsa_cosim.report.page import write_page
+
+        if not self.report:
+            return []
+        try:
+            return [write_page(folder)]
+        except ThsaCosimError as error:
+            click.echo(f"note: no page was written: {error}", err=True)
+            return []
 
     def check_kind(self, kind: str, wanted: str) -> None:
         """InputError, with the command to use, if the scenario is of another kind."""
@@ -98,6 +125,7 @@ _OPTIONS = (
     click.option("--cluster", default=None, help="Address of a Dask scheduler instead of local processes."),
     click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors."),
     click.option("--json", "as_json", is_flag=True, help="Print result.json instead of tables."),
+    click.option("--report/--no-report", default=True, show_default=True, help="Write report.html as well."),
 )
 """In the order in which help shows them."""
 
@@ -120,12 +148,6 @@ def study_options(command: Callable[Concatenate[StudyOptions, P], None]) -> Call
 
 class Interrupted(Exception):
     """A study was interrupted and has written what it has; the message is the command that continues it."""
-
-    def __init__(self, command: str, options: StudyOptions, folder: Path) -> None:
-        arguments = list(sys.argv[1:]) or [command, str(options.scenario)]
-        if options.output is None:
-            arguments += ["-o", str(folder)]
-        super().__init__(shlex.join(["thsa-cosim", *arguments]))
 
 
 def console(*, stderr: bool = False) -> "Console":

@@ -9,7 +9,7 @@ from thsa_cosim.cli.options import StudyOptions, study_options
 @study_options
 def simulate(options: StudyOptions) -> None:
     """Run SCENARIO once per recording and compare; parameters to be identified keep their start values."""
-    from thsa_cosim.identify import open_study, study_identity
+    from thsa_cosim.identify import describe, open_study, study_identity
     from thsa_cosim.report.study import RESULT, write_simulate
     from thsa_cosim.report.tables import print_simulate
     from thsa_cosim.scenario import load_scenario
@@ -17,7 +17,9 @@ def simulate(options: StudyOptions) -> None:
 
     loaded = load_scenario(options.scenario, **options.overrides)
     place = options.place("" if loaded.kind == "simulate" else "-simulate")
-    open_study(place["folder"], {**study_identity(loaded), "kind": "simulate"})
+    folder = place["folder"]
+    about = describe(loaded, options.repeat("simulate", folder))
+    open_study(folder, {**study_identity(loaded), "kind": "simulate"}, about)
     result = run(loaded, **place)
-    files = write_simulate(result, place["folder"])
-    options.conclude(place["folder"] / RESULT, len(files), lambda out: print_simulate(out, result))
+    files = [*write_simulate(result, folder), *options.page(folder)]
+    options.conclude(folder / RESULT, len(files), lambda out: print_simulate(out, result))

@@ -23,11 +23,12 @@ def tune(options: StudyOptions) -> None:
     loaded = load_tune(options.scenario, seed=options.seed, fmu=options.fmu)
     place = options.place()
     folder = place["folder"]
+    repeat = options.repeat("tune", folder)
     with ProgressDisplay(console(stderr=True), quiet=options.quiet) as display:
-        result = run(loaded, **place, on_progress=display)
-        files = write_tune(result, folder)
+        result = run(loaded, **place, on_progress=display, command=repeat)
+        files = [*write_tune(result, folder), *options.page(folder)]
     if result.status == "interrupted":
-        raise Interrupted("tune", options, folder)
+        raise Interrupted(repeat)
     options.conclude(folder / RESULT, len(files), lambda out: print_tune(out, result))
     if result.after is None or not result.after.feasible:
         raise StudyError(f"{options.scenario}: no gains within the bounds keep every hard requirement.")

@@ -50,8 +50,12 @@ def _origin() -> dict[str, object]:
             versions[package] = version(package)
         except PackageNotFoundError:  # a stripped installation; the study itself does not need to know
             continue
-    now = datetime.datetime.now(datetime.UTC)
-    return {"started": now.isoformat(timespec="seconds"), "system": platform.platform(), "versions": versions}
+    return {
+        "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "directory": str(Path.cwd()),
+        "system": platform.platform(),
+        "versions": versions,
+    }
 
 
 def open_study(

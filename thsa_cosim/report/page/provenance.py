@@ -36,7 +36,7 @@ def provenance(study: Study) -> Section:
     if about.get("system"):
         facts.append(("system", str(about["system"])))
     if about.get("started"):
-        facts.append(("started", str(about["started"])))
+        facts.append(("started", f"{about['started']} in {about.get('directory', 'an unknown folder')}"))
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     facts.append(("page written", f"{now}, thsa-cosim {__version__}"))
     blocks: list[Block] = [Facts(facts, code=True)]

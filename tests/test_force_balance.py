@@ -47,7 +47,8 @@ def shortened(folder: Path, text: str = "", old: str = "", new: str = "") -> Pat
     for long, short in (
         ("18.7195", "3.9995"),
         ("period = 6.24", "period = 1.0"),
-        ("generations = 20", "generations = 5"),
+        ("population = 15", "population = 8"),
+        ("generations = 20", "generations = 3"),
     ):
         assert long in content
         content = content.replace(long, short)

@@ -1,5 +1,6 @@
 """The command line around the studies: help, versions, one sentence per mistake, never a traceback."""
 
+import shlex
 import subprocess
 import sys
 import zipfile
@@ -10,7 +11,7 @@ from click.testing import CliRunner
 
 import thsa_cosim
 from thsa_cosim import cli
-from thsa_cosim.cli.options import Interrupted, StudyOptions
+from thsa_cosim.cli.options import StudyOptions
 from thsa_cosim.errors import FmuError, MissingExtraError, StudyError
 
 ROOT = Path(__file__).parents[1]
@@ -185,17 +186,18 @@ def test_every_exception_is_one_sentence(
     assert len(err.strip().splitlines()) == 1
 
 
-def test_the_command_to_continue_names_the_folder(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(scenario: str, output: Path | None, folder: Path) -> str:
-        options = StudyOptions(Path(scenario), (), (), output, None, None, None, None, False, False)
-        return str(Interrupted("identify", options, folder))
-
-    monkeypatch.setattr(sys, "argv", ["thsa-cosim", "identify", "my scenario.toml", "--seed", "3"])
+def test_the_command_to_continue_is_the_one_that_was_given_with_its_folder() -> None:
+    given = StudyOptions(Path("my scenario.toml"), (), (), None, 3, None, None, None, True, False, True)
     folder = Path("studies/my scenario-2026-01-01")
-    text = interrupted("my scenario.toml", None, folder)
+    text = given.repeat("identify", folder)
     assert text == f"thsa-cosim identify 'my scenario.toml' --seed 3 -o '{folder}'"
-    monkeypatch.setattr(sys, "argv", ["thsa-cosim", "identify", "s.toml", "-o", "here"])
-    assert interrupted("s.toml", Path("here"), Path("here")) == "thsa-cosim identify s.toml -o here"
+    runs = (Path("a.csv"), Path("b.csv"))
+    given = StudyOptions(
+        Path("s.toml"), runs, (Path("c.csv"),), folder, None, None, 2, None, False, False, True
+    )
+    words = shlex.split(given.repeat("identify", Path("here")))
+    fit = ["--fit", "a.csv", "--fit", "b.csv", "--validate", "c.csv"]
+    assert words == ["thsa-cosim", "identify", "s.toml", *fit, "--workers", "2", "-o", "here"]
 
 
 def test_shell_completion_is_there() -> None:

@@ -10,7 +10,7 @@ model Actuator "THSA in closed velocity loop, every loss a law over temperature"
   THSA.Interfaces.RealOutput u_q(unit="V", nominal=10) "Voltage of the q axis";
   THSA.Controllers.VelocityController velocityController "Velocity loop, the law to tune";
   THSA.Controllers.CurrentController currentController "Current loop";
-  THSA.Motor motor(du=inverterEffect.du, dT=windingEffect.dT, g_t=torqueEffect.g_t, g_e=torqueEffect.g_e,
+  THSA.Motor motor(du=inverterEffect.du, g_R=windingEffect.g_R, g_psi=windingEffect.g_psi, g_t=torqueEffect.g_t, g_e=torqueEffect.g_e,
     tau_f=motorEffect.F) "Motor";
   THSA.Gearbox gearbox(tau_f=gearboxEffect.F) "Gearbox";
   THSA.NoBack noBack "No-back device";
@@ -21,7 +21,7 @@ model Actuator "THSA in closed velocity loop, every loss a law over temperature"
   replaceable THSA.Effects.IdealInverter inverterEffect constrainedby THSA.Interfaces.VoltageEffect
     "Slot: voltage of the inverter";
   replaceable THSA.Effects.NoHeating windingEffect constrainedby THSA.Interfaces.HeatingEffect
-    "Slot: temperature of the winding";
+    "Slot: heating of winding and magnets";
   replaceable THSA.Effects.ConstantTorqueConstant torqueEffect constrainedby THSA.Interfaces.TorqueConstantEffect
     "Slot: torque constant";
   replaceable THSA.Effects.NoFriction motorEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))

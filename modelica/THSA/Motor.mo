@@ -6,7 +6,8 @@ model Motor "Permanent-magnet synchronous motor in the power-invariant dq frame,
   THSA.Interfaces.RealOutput w_m(unit="rad/s", start=0, fixed=true, nominal=10) "Speed of the rotor";
   THSA.Interfaces.RotationalFlange flange "Shaft";
   input THSA.Units.Voltage du = 0 "Voltage that the inverter adds";
-  input Real dT(unit="K") = 0 "Temperature of the winding above T";
+  input THSA.Units.Ratio g_R = 0 "Relative change of the winding resistance";
+  input THSA.Units.Ratio g_psi = 0 "Relative change of the magnets' flux";
   input THSA.Units.Ratio g_t = 0 "Relative change of the torque constant";
   input THSA.Units.Ratio g_e = 0 "Relative change of the back-EMF constant";
   input THSA.Units.Torque tau_f = 0 "Added friction torque";
@@ -38,7 +39,7 @@ model Motor "Permanent-magnet synchronous motor in the power-invariant dq frame,
   THSA.Units.Power P_co "Copper loss";
   THSA.Units.Power P_f "Friction loss";
 equation
-  R_s.T = T + dT;
+  connect(T, R_s.T);
   connect(T, psi_pm.T);
   connect(T, T_fm.T);
   connect(T, b_m.T);
@@ -47,11 +48,11 @@ equation
   connect(w_m, friction.v);
   phi = flange.phi;
   w_m = der(phi);
-  K_t = sqrt(3/2)*p*psi_pm.y;
-  L*der(i_q) = u_q + du - R_s.y*i_q - K_t*(1 + g_e)*w_m;
+  K_t = sqrt(3/2)*p*psi_pm.y*(1 + g_psi);
+  L*der(i_q) = u_q + du - R_s.y*(1 + g_R)*i_q - K_t*(1 + g_e)*w_m;
   tau_e = K_t*(1 + g_t)*i_q;
   J*der(w_m) = tau_e - friction.F_f - tau_f + flange.tau;
-  P_co = R_s.y*i_q^2;
+  P_co = R_s.y*(1 + g_R)*i_q^2;
   P_f = (friction.F_f + tau_f)*w_m;
   annotation(
     Documentation(info="<html>

@@ -3,6 +3,6 @@ block LoadDependentFriction "Friction in proportion to the load that the pair ca
   extends THSA.Interfaces.FrictionEffect;
   parameter Real mu(unit="1", min=-1, max=1) = 0 "Friction per load";
 equation
-  F = mu*abs(N)*s;
+  F = mu*noEvent(abs(N))*s;
   annotation(Documentation(info="<html><p>mu |N| sgn(v).</p></html>"));
 end LoadDependentFriction;

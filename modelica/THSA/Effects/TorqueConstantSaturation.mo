@@ -5,7 +5,7 @@ block TorqueConstantSaturation "Torque constant that falls with the current"
   parameter Real b(unit="1/A") = 0 "Relative fall per current";
   parameter Real r_e(unit="1", min=0, max=1) = 0 "Share of the fall in the back-EMF";
 equation
-  g_t = -a*i_q^2 - b*abs(i_q);
+  g_t = -a*i_q^2 - b*noEvent(abs(i_q));
   g_e = r_e*g_t;
   annotation(Documentation(info="<html><p>K_t (1 &minus; a i_q<sup>2</sup> &minus; b |i_q|).</p></html>"));
 end TorqueConstantSaturation;

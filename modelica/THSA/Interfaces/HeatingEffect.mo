@@ -1,7 +1,8 @@
 within THSA.Interfaces;
-partial block HeatingEffect "Effect that warms the winding"
+partial block HeatingEffect "Effect that warms the motor"
   THSA.Interfaces.RealInput P(unit="W") "Copper loss";
-  THSA.Interfaces.RealOutput dT(unit="K") "Temperature of the winding above that of the box";
+  THSA.Interfaces.RealOutput g_R(unit="1") "Relative change of the winding resistance";
+  THSA.Interfaces.RealOutput g_psi(unit="1") "Relative change of the magnets' flux";
   annotation(
     Documentation(info="<html><p>Place of thermal networks of the motor.</p></html>"),
     Icon(graphics={Rectangle(extent={{-100,100},{100,-100}}, lineColor={170,80,0}, pattern=LinePattern.Dash),

@@ -19,6 +19,7 @@ no exception but an outcome (``thsa_cosim.batch``).
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
 
 
 class ThsaCosimError(Exception):
@@ -69,6 +70,19 @@ class StudyError(ThsaCosimError):
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return ``" Did you mean 'x'?"`` for the closest of ``known``, or an empty string."""
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
-    return f" Did you mean {close[0]!r}?" if close else ""
+    """Return ``" Did you mean 'x'?"`` for the closest of ``known``, or an empty string; case does not count."""
+    spelt = {name.lower(): name for name in known}
+    close = difflib.get_close_matches(word.lower(), spelt, n=1, cutoff=0.6)
+    return f" Did you mean {spelt[close[0]]!r}?" if close else ""
+
+
+def did_you_mean_path(path: Path) -> str:
+    """Return :func:`did_you_mean` for a file that is not there: about the first part of its path that is not."""
+    missing = path
+    try:
+        while not missing.parent.exists() and missing.parent != missing:
+            missing = missing.parent
+        names = [p.name for p in missing.parent.iterdir()]
+    except (OSError, ValueError):
+        return ""
+    return did_you_mean(missing.name, names)

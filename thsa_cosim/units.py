@@ -85,7 +85,13 @@ def conversion(source: str, target: str) -> tuple[float, float]:
     UnitError
         If a unit is unknown, the dimensions differ, or the pair hides a factor of 2 pi (Hz and rad/s).
     """
-    a, b = _parse(source), _parse(target)
+    b = _parse(target)
+    try:
+        a = _parse(source)
+    except UnitError:
+        raise UnitError(
+            f"unknown unit {source!r}; write it as in 'N.m/(rad/s)'.{_meant(source, target)}"
+        ) from None
     if source == target or a == b:
         return 1.0, 0.0
     _check_frequency(source, target)
@@ -98,8 +104,15 @@ def conversion(source: str, target: str) -> tuple[float, float]:
     except Exception:
         raise UnitError(
             f"unit {source!r} cannot be turned into {target!r} (their dimensions differ); correct the unit."
+            f"{_meant(source, target)}"
         ) from None
     return factor, offset
+
+
+def _meant(unit: str, target: str) -> str:
+    """Return a hint at ``target``, or a common unit of its dimension, that looks like ``unit``."""
+    dimension = _parse(target).dimensionality
+    return did_you_mean(unit, [target, *(u for u in _COMMON if _parse(u).dimensionality == dimension)])
 
 
 def _difference(unit: pint.Unit) -> pint.Unit:

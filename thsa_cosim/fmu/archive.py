@@ -7,7 +7,7 @@ import zipfile
 import zlib
 from pathlib import Path, PurePosixPath
 
-from thsa_cosim.errors import FmuError
+from thsa_cosim.errors import FmuError, did_you_mean_path
 
 MAXIMUM_UNPACKED_BYTES = 8 * 2**30
 """Above this an archive is taken for a zip bomb."""
@@ -22,7 +22,7 @@ def sha256_of(path: Path) -> str:
 def open_archive(path: Path) -> zipfile.ZipFile:
     """Open ``path`` as a zip archive; FmuError says in one sentence why it is none."""
     if not path.exists():
-        raise FmuError(f"{path} does not exist; name an .fmu file.")
+        raise FmuError(f"{path} does not exist; name an .fmu file.{did_you_mean_path(path)}")
     if path.is_dir():
         raise FmuError(f"{path} is a folder; name an .fmu file.")
     if not path.is_file():  # a pipe would wait for ever

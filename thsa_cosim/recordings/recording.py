@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from thsa_cosim.errors import RecordingError, ThsaCosimError, UnitError, did_you_mean
+from thsa_cosim.errors import RecordingError, ThsaCosimError, UnitError, did_you_mean, did_you_mean_path
 from thsa_cosim.recordings.axis import TimeAxis, check_finite, common_grid, source_unit, times
 from thsa_cosim.recordings.noise import noise_estimate
 from thsa_cosim.recordings.piecewise import fit_piecewise_linear
@@ -217,15 +217,15 @@ def _load_chosen(
 def _load(path: Path, choose: Choose) -> tuple[dict[str, RawColumn], str]:
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        hint = did_you_mean(suffix, SUFFIXES) or f" Known endings: {', '.join(SUFFIXES)}."
+        near = "" if path.exists() else did_you_mean_path(path)
+        hint = near or did_you_mean(suffix, SUFFIXES) or f" Known endings: {', '.join(SUFFIXES)}."
         raise RecordingError(f"{path}: file ending {suffix!r} is not a known recording format.{hint}")
     if path.exists() and not path.is_file():  # a pipe would wait for ever, a device has no end
         raise RecordingError(f"{path}: cannot be read (it is a folder, pipe or device); name a file.")
     try:
         content = path.read_bytes()
     except FileNotFoundError:
-        near = did_you_mean(path.name, _neighbours(path))
-        raise RecordingError(f"{path}: no such file; check the path.{near}") from None
+        raise RecordingError(f"{path}: no such file; check the path.{did_you_mean_path(path)}") from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise RecordingError(f"{path}: cannot be read ({reason}).") from None
@@ -242,13 +242,6 @@ def _load(path: Path, choose: Choose) -> tuple[dict[str, RawColumn], str]:
         raise RecordingError(
             f"{path}: is no readable {SUFFIXES[suffix]} file ({reason.rstrip('.')}); export it again."
         ) from None
-
-
-def _neighbours(path: Path) -> list[str]:
-    try:
-        return [p.name for p in path.parent.iterdir()]
-    except OSError:
-        return []
 
 
 def _to_unit(

@@ -9,8 +9,10 @@ The ``tune_`` modules are the same for tunings, which need no recordings.
 
 from thsa_cosim.scenario.load import load_scenario
 from thsa_cosim.scenario.model import (
+    BalanceSpec,
     Channel,
     CostSpec,
+    DiagnoseSpec,
     ForceSpec,
     LawSpec,
     Scenario,
@@ -26,8 +28,10 @@ from thsa_cosim.scenario.tune_model import TuneScenario
 
 __all__ = [
     "KINDS",
+    "BalanceSpec",
     "Channel",
     "CostSpec",
+    "DiagnoseSpec",
     "ForceSpec",
     "LawSpec",
     "Scenario",

@@ -3,13 +3,20 @@
 import fnmatch
 from collections.abc import Mapping
 from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 
 from thsa_cosim.errors import ParameterError, ScenarioError, UnitError, did_you_mean
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
-from thsa_cosim.scenario.model import ForceSpec
-from thsa_cosim.scenario.schema import CommonTable, IdentifyTable, ParameterTable, SimulateTable
+from thsa_cosim.scenario.model import BalanceSpec, DiagnoseSpec, ForceSpec
+from thsa_cosim.scenario.schema import (
+    CommonTable,
+    DiagnoseTable,
+    IdentifyTable,
+    ParameterTable,
+    SimulateTable,
+)
 from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.ssv import read_ssv
 from thsa_cosim.units import convert
@@ -28,7 +35,7 @@ def find_variable(
             )
         return fmu.variables[name]
     known = [v.name for v in candidates] or list(fmu.variables)
-    hint = did_you_mean(name, known)
+    hint = did_you_mean(name, known) or did_you_mean(name, fmu.variables)
     if not hint and 0 < len(known) <= 12:
         hint = f" It has {', '.join(known)}."
     raise ScenarioError(f"{key}: {fmu.path.name} has no variable {name!r}.{hint}")
@@ -134,6 +141,49 @@ def force(table: IdentifyTable, fmu: FmuDescription, measured: tuple[str, ...]) 
     if not isinstance(mass, float):
         raise ScenarioError(f"force.mass: {spec.mass!r} of {fmu.path.name} has no number as its start value.")
     return ForceSpec(**spec.model_dump(), mass_at_start=mass)
+
+
+def diagnosis(
+    path: Path, table: DiagnoseTable, fmu: FmuDescription, inputs: Sequence[str], measured: Sequence[str]
+) -> DiagnoseSpec:
+    """Return what a diagnosis needs; ScenarioError for an input, a signal or a folder that is not there."""
+    spec = table.diagnose
+    for key in ("command", "load"):
+        name = getattr(spec, key)
+        if name is not None and name not in inputs:
+            raise ScenarioError(
+                f"diagnose.{key}: {name!r} is no input with a column.{did_you_mean(name, inputs)}"
+            )
+    for balance in spec.balances:
+        if balance.moving is not None and balance.moving not in (*inputs, *measured):
+            raise ScenarioError(
+                f"diagnose.balances[{balance.name}].moving: {balance.moving!r} has no column."
+                f"{did_you_mean(balance.moving, (*inputs, *measured))}"
+            )
+    package, own = (
+        path.parent / spec.package,
+        None if spec.catalogue is None else path.parent / spec.catalogue,
+    )
+    if spec.model is not None and not (package / "package.mo").is_file():
+        raise ScenarioError(
+            f"diagnose.package: {package} is no Modelica package (no package.mo); correct the path."
+        )
+    if own is not None and not own.is_dir():
+        raise ScenarioError(f"diagnose.catalogue: there is no folder {own}; correct the path.")
+    return DiagnoseSpec(
+        model=spec.model,
+        package=package,
+        effects=tuple(spec.effects),
+        catalogue=own,
+        most=spec.most,
+        spreads={p.name: spec.spread if p.spread is None else p.spread for p in table.parameters},
+        command=spec.command,
+        load=spec.load,
+        empirical=spec.empirical,
+        balances=tuple(
+            BalanceSpec(b.name, b.unit, b.left, tuple(b.terms), b.moving, b.band) for b in spec.balances
+        ),
+    )
 
 
 def readable(fmu: FmuDescription, name: str, key: str) -> Variable:

@@ -5,7 +5,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from thsa_cosim.errors import ScenarioError, did_you_mean
+from thsa_cosim.errors import ScenarioError, did_you_mean_path
 
 
 def expand(path: Path, key: str, own: Sequence[str], replaced_by: Sequence[Path | str]) -> list[Path]:
@@ -37,12 +37,8 @@ def _matches(option: str, folder: Path, name: str) -> list[Path]:
         raise ScenarioError(f"{option}: {name!r} is no usable path ({error}).") from None
     if matches:
         return matches
-    try:
-        near = [str(p.relative_to(folder)) for p in plain.parent.iterdir()]
-    except (OSError, ValueError):
-        near = []
     raise ScenarioError(
-        f"{option}: {name!r} matches no file in {folder.resolve()}.{did_you_mean(name, near)}"
+        f"{option}: {name!r} matches no file in {folder.resolve()}.{did_you_mean_path(plain)}"
     )
 
 

@@ -1,14 +1,14 @@
 """From the TOML file to a :class:`Scenario`: files found and read, units converted, everything checked."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from thsa_cosim.errors import InputError, ScenarioError, did_you_mean
+from thsa_cosim.errors import InputError, ScenarioError, did_you_mean, did_you_mean_path
 from thsa_cosim.fmu import FmuDescription, read_description
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Column, Recording, TimeAxis, read_recording
@@ -24,7 +24,7 @@ from thsa_cosim.scenario.model import (
     TemperaturePoint,
 )
 from thsa_cosim.scenario.recording_schema import TemperatureTable
-from thsa_cosim.scenario.schema import KINDS, CommonTable, IdentifyTable, SimulateTable
+from thsa_cosim.scenario.schema import KINDS, CommonTable, DiagnoseTable, IdentifyTable, SimulateTable
 from thsa_cosim.scenario.sentences import from_validation, one_line
 
 
@@ -71,10 +71,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
-        try:
-            near = did_you_mean(path.name, [p.name for p in path.parent.iterdir()])
-        except OSError:
-            near = ""
+        near = did_you_mean_path(path)
         raise ScenarioError(one_line(f"{path}: no such scenario file; check the path.{near}")) from None
     except UnicodeDecodeError:
         raise ScenarioError(one_line(f"{path}: is not UTF-8 text; save it as UTF-8.")) from None
@@ -93,17 +90,24 @@ def parse(path: Path, data: Mapping[str, Any]) -> CommonTable:
     if kind == "tune":
         raise ScenarioError(one_line(f"{path}: kind is 'tune': run 'thsa-cosim tune {path}'."))
     if not isinstance(kind, str) or kind not in KINDS:
-        what = "is missing" if kind is None else f"is {kind!r}"
-        hint = did_you_mean(kind, KINDS) if isinstance(kind, str) else ""
-        if kind is None:
-            misspelt = next((k for k in data if did_you_mean(k, ["kind"])), None)
-            what += f" ({misspelt!r} is no key)" if misspelt else ""
+        what, hint = about_kind(data, KINDS)
         supported = " or ".join(f'"{k}"' for k in KINDS)
         raise ScenarioError(one_line(f"{path}: kind {what}; supported kinds are {supported}.{hint}"))
     try:
         return KINDS[kind].model_validate(data)
     except ValidationError as error:
         raise from_validation(path, data, error) from None
+
+
+def about_kind(data: Mapping[str, Any], known: Iterable[str]) -> tuple[str, str]:
+    """Return what is wrong with ``kind``, which is none of ``known``, and a hint at what was meant."""
+    kind = data.get("kind")
+    if kind is not None:
+        return f"is {kind!r}", did_you_mean(kind, known) if isinstance(kind, str) else ""
+    misspelt = next((k for k in data if did_you_mean(k, ["kind"])), None)
+    if misspelt is None:
+        return "is missing", ""
+    return f"is missing ({misspelt!r} is no key)", did_you_mean(misspelt, ["kind"])
 
 
 def _resolve(
@@ -155,6 +159,11 @@ def _resolve(
         round_to=table.temperature.round_to if table.temperature else 1.0,
         zeroed=check.zeroed(table, description),
         force=check.force(table, description, measured) if isinstance(table, IdentifyTable) else None,
+        diagnose=(
+            check.diagnosis(path, table, description, inputs, measured)
+            if isinstance(table, DiagnoseTable)
+            else None
+        ),
     )
     if isinstance(table, IdentifyTable):
         for recording in scenario.fit:

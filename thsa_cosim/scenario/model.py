@@ -62,6 +62,37 @@ class ForceSpec:
 
 
 @dataclass(frozen=True)
+class BalanceSpec:
+    """An equation between measured signals: ``left`` ≈ Σ c_k ``terms[k]``, below ``band`` Hz, where ``moving`` moves."""
+
+    name: str
+    unit: str
+    left: str
+    terms: tuple[str, ...]
+    moving: str | None = None
+    band: float = 20.0
+
+
+@dataclass(frozen=True)
+class DiagnoseSpec:
+    """Which model gets effects, which effects are tried, and how far parameters may be off the drawing.
+
+    ``spreads``: relative standard deviation by parameter name. ``command`` and ``load`` are inputs of the FMU.
+    """
+
+    model: str | None
+    package: Path
+    effects: tuple[str, ...]
+    catalogue: Path | None
+    most: int
+    spreads: Mapping[str, float]
+    command: str | None
+    load: str | None
+    empirical: bool
+    balances: tuple[BalanceSpec, ...]
+
+
+@dataclass(frozen=True)
 class SearchSpec:
     """Differential evolution and what follows it; ``profile`` names parameters for a profile likelihood."""
 
@@ -137,6 +168,8 @@ class Scenario:
     zeroed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """FMU parameters that are 0 because of a parameter's ``zero`` or ``law_block``, by its name."""
     force: ForceSpec | None = None
+    diagnose: DiagnoseSpec | None = None
+    """Of a diagnosis only."""
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -100,7 +100,10 @@ class ChannelTable(Table):
     def _noise(cls, noise: float | str) -> float | str:
         if noise == "estimate" or (isinstance(noise, float | int) and noise > 0):
             return noise
-        raise PydanticCustomError("noise", "must be 'estimate' or a number above 0 in the variable's unit")
+        hint = did_you_mean(noise, ["estimate"]) if isinstance(noise, str) else ""
+        raise PydanticCustomError(
+            "noise", "must be 'estimate' or a number above 0 in the variable's unit.{hint}", {"hint": hint}
+        )
 
 
 class WindowTable(Table):
@@ -240,6 +243,65 @@ class IdentifyTable(CommonTable):
     force: ForceTable | None = None
 
 
+class BalanceTable(Table):
+    """``[[diagnose.balances]]``: an equation between measured signals, whose residual says where an effect sits.
+
+    Names are measured signals and inputs; ``der``, ``sgn``, ``abs``, ``max`` and ``min`` are understood. The terms'
+    coefficients are fitted, so that wrong declared parameters do not show.
+    """
+
+    name: Name
+    """Such as ``"electrical"``."""
+    unit: str
+    """Unit of the left side."""
+    left: Name
+    """Left side, such as ``"u_q"``."""
+    terms: list[Name] = Field(min_length=1)
+    """Right side, such as ``["i_q", "der(i_q)", "w_m"]``."""
+    moving: Name | None = None
+    """A signal; samples where it is nearly zero are left out, since stiction leaves the balance open there."""
+    band: Positive = 20.0
+    """Hz; both sides are low-passed alike, without phase shift."""
+
+
+class DiagnoseOptionsTable(Table):
+    """``[diagnose]``: the model that effects are added to, and which are tried."""
+
+    model: Name | None = None
+    """Modelica class with effect slots, such as ``"THSA.Actuator"``; left out: the FMU is a black box."""
+    package: Name = "../modelica/THSA"
+    """Folder of its package, relative to the scenario."""
+    effects: list[Name] = []
+    """Names from the catalogue to try; none: all."""
+    catalogue: Name | None = None
+    """A folder with effects of your own, one ``.py`` file each."""
+    most: Annotated[int, Field(ge=1, le=10)] = 3
+    """At most so many effects are added."""
+    spread: Positive = 0.1
+    """Relative standard deviation of a declared parameter about the drawing; ``parameters.spread`` wins over it."""
+    command: Name | None = None
+    """The input that commands the drive, and ..."""
+    load: Name | None = None
+    """... the one that loads it: what a separating experiment may vary."""
+    empirical: bool = False
+    """Add an empirical law to the model where structure is left that no effect explains."""
+    balances: list[BalanceTable] = []
+
+
+class DiagnoseParameterTable(ParameterTable):
+    """``[[parameters]]`` of a diagnosis: a declared parameter, known from the drawing up to its spread."""
+
+    spread: Positive | None = None
+    """Relative standard deviation about the drawing's value."""
+
+
+class DiagnoseTable(IdentifyTable):
+    """``kind = "diagnose"``: find what the model lacks."""
+
+    parameters: list[DiagnoseParameterTable] = Field(min_length=1)  # type: ignore[assignment]
+    diagnose: DiagnoseOptionsTable = DiagnoseOptionsTable()
+
+
 class StageTable(Table):
     """``[[stages]]``: what is run, in order."""
 
@@ -264,5 +326,9 @@ class StagesTable(Table):
     stages: list[StageTable] = Field(min_length=1)
 
 
-KINDS: dict[str, type[CommonTable]] = {"identify": IdentifyTable, "simulate": SimulateTable}
+KINDS: dict[str, type[CommonTable]] = {
+    "identify": IdentifyTable,
+    "simulate": SimulateTable,
+    "diagnose": DiagnoseTable,
+}
 """Table class per ``kind``."""

@@ -54,6 +54,9 @@ def load_study(
     path = Path(path)
     data = read_toml(path)
     if "stages" not in data:
+        for key in data:
+            if hint := did_you_mean(key, ["stages"]):
+                raise ScenarioError(one_line(f"{path}: unknown key {key!r}.{hint}"))
         return load_scenario(path, fit=fit, validate=validate, seed=seed, fmu=fmu)
     try:
         table = StagesTable.model_validate(data)

@@ -11,7 +11,7 @@ from thsa_cosim.errors import InputError, MissingExtraError, ScenarioError, Unit
 from thsa_cosim.fmu import FmuDescription, Variable, read_description
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.scenario import check
-from thsa_cosim.scenario.load import read_toml
+from thsa_cosim.scenario.load import about_kind, read_toml
 from thsa_cosim.scenario.model import SearchSpec, SimulationSpec
 from thsa_cosim.scenario.schema import KINDS
 from thsa_cosim.scenario.sentences import from_validation, one_line
@@ -54,8 +54,7 @@ def load_tune(path: Path | str, *, seed: int | None = None, fmu: Path | str | No
             raise ScenarioError(
                 one_line(f"{path} is a scenario of kind {kind!r}: run 'thsa-cosim {kind} {path}'.")
             )
-        hint = did_you_mean(kind, ["tune"]) if isinstance(kind, str) else ""
-        what = "is missing" if kind is None else f"is {kind!r}"
+        what, hint = about_kind(data, ["tune"])
         raise ScenarioError(one_line(f'{path}: kind {what}; thsa-cosim tune takes kind = "tune".{hint}'))
     try:
         table = TuneTable.model_validate(data)

@@ -248,3 +248,83 @@ def write_tune(folder: Path) -> dict[str, Any]:
         variants[name] = Signals(time, {"v": response, "i_q": command - response}, units)
     write_signals(folder, "response", "T_amb = -30 degC", variants)
     return result
+
+
+def diagnose_result() -> dict[str, Any]:
+    """A backlash was found; stribeck was weighed and refused, and the heating of the winding cannot be tested."""
+    gap = {"value": 2.5e-4, "unit": "m", "stderr": 1e-5}
+    before, after = {"v": {"rmse": 1e-4, "noise": 2e-5}}, {"v": {"rmse": 2.1e-5, "noise": 2e-5}}
+    return {
+        "kind": "diagnose",
+        "title": "unit 7",
+        "status": "complete",
+        "seed": 7,
+        "evaluations": 300,
+        "failures": {},
+        "fmu": {"path": "THSA.fmu", "sha256": "a" * 64},
+        "scenario": "driven.toml",
+        "version": "0.1.0",
+        "verdict": "missing-effect",
+        "effects": [
+            {
+                "name": "backlash",
+                "parameters": {"gap": gap},
+                "equivalent": ["velocity-sensor-delay"],
+                "probability": 0.99,
+            }
+        ],
+        "before": {"fit": before, "validate": before},
+        "after": {"fit": after, "validate": after},
+        "unexplained": 0.02,
+        "model": "THSA_with_backlash.mo",
+        "candidates": [
+            {
+                "name": "backlash",
+                "variant": "screw",
+                "held_out_gain": 0.79,
+                "p_value": 1e-9,
+                "parameters": {"gap": gap},
+            }
+            | {"decision": "accepted", "reason": "the held-out error falls"},
+            {"name": "stribeck", "variant": "screw", "held_out_gain": 0.001, "p_value": 0.4, "parameters": {}}
+            | {"decision": "refused", "reason": "no better than declared parameters tuned again"},
+        ],
+        "not_testable": [{"name": "winding-self-heating", "reason": "the recordings are shorter than 60 s"}],
+        "balance": [
+            {
+                "equation": "screw contact",
+                "unit": "N",
+                "rmse": 900.0,
+                "noise": 60.0,
+                "share": 0.9,
+                "at_fault": True,
+            },
+            {"equation": "winding", "unit": "V", "rmse": 0.31, "noise": 0.3, "share": 0.1, "at_fault": False},
+        ],
+        "experiment": {
+            "between": ["backlash", "velocity-sensor-delay"],
+            "record": "slow reversals under no load",
+        },
+        "notes": [],
+    }
+
+
+def write_diagnose(folder: Path) -> dict[str, Any]:
+    """A finished diagnosis."""
+    result = diagnose_result()
+    open_study(folder, identity("diagnose"), about())
+    (folder / "result.json").write_text(json.dumps(result))
+    time = np.arange(3000) * 1e-3
+    true = 9e-3 * np.sin(2.0 * np.pi * time)
+    for role, name in (("fit", "fit_1"), ("validate", "validate_1")):
+        noise = np.random.default_rng(1).normal(0.0, 2e-5, time.size)
+        jump = 1e-4 * np.sign(np.cos(2.0 * np.pi * time))
+        values = {"measured": true + jump + noise, "before": true, "after": true + jump}
+        write_signals(
+            folder, role, name, {k: Signals(time, {"v": v}, {"v": "m/s"}) for k, v in values.items()}
+        )
+    lines = ["variable,bin_centre,unit,channel,mean_before,mean_after,stderr"]
+    for variable, unit in (("v", "m/s"), ("F_load", "N")):
+        lines += [f"{variable},{k / 10},{unit},v,{1e-4 * (k % 2)},{1e-6},{1e-6}" for k in range(-5, 6)]
+    (folder / "structure.csv").write_text("\n".join(lines) + "\n")
+    return result

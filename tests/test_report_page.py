@@ -151,6 +151,31 @@ def test_axis_titles_and_panel_headings_do_not_overlap(identified: Any, tuned: A
                     assert apart_x or apart_y, (name, first, second)
 
 
+def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(
+    show: Show, tmp_path: Path
+) -> None:
+    studies.write_diagnose(tmp_path)
+    page = show(write_page(tmp_path))
+    summary = page.inner_text("#summary")
+    assert "The model lacks backlash: added to it, the error on held-out recordings falls." in summary
+    assert "(2.50 ± 0.10)e-4" in summary
+    assert "These recordings cannot tell backlash from velocity-sensor-delay." in summary
+    assert "slow reversals under no load" in summary
+    assert "2 % of the repeatable residual is left unexplained." in summary
+    assert cells(table_of(page, "Errors before and after"), "after / noise") == ["1.05", "1.05"]
+    assert cells(table_of(page, "Errors before and after"), "unit") == ["m/s", "m/s"]
+    assert cells(table_of(page, "The residual by balance equation"), "at fault") == ["yes", "no"]
+    assert cells(table_of(page, "Effects that were weighed"), "decision") == ["accepted", "refused"]
+    assert "shorter than 60 s" in page.inner_text("#candidates")
+    found = plots(page)
+    assert set(found) == {"balance", "ratios", "dependence", "signals-0", "signals-1"}
+    assert len(found["balance"].query_selector_all(".barlayer .point path")) == 2
+    assert axis_titles(found["dependence"]) == ["v [m/s]", "F_load [N]", "v [m/s]", "v [m/s]"]
+    names = found["signals-0"].evaluate("p => p._fullData.map(t => t.name)")
+    assert names == ["measured", "before", "after", "residual before", "residual after"]
+    assert page.troubles == []
+
+
 def test_single_wrong_sample_of_thousands_is_in_the_plot(identified: Any) -> None:
     plot = plots(identified)["signals-1"]
     drawn = plot.evaluate("p => p._fullData.filter(t => t.name === 'residual').map(t => Math.min(...t.y))")

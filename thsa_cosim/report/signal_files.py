@@ -66,9 +66,7 @@ def read_signals(path: Path) -> SignalFile:
     """Read what ``write_signals`` wrote; InputError for any other file."""
     try:
         table = pq.read_table(path)
-        facts = {key.decode(): value.decode() for key, value in (table.schema.metadata or {}).items()}
-        sibling = path.parent.parent / "units.json"
-        units = json.loads(facts.get("units") or (sibling.read_text() if sibling.is_file() else "{}"))
+        facts = _facts(path, table.schema)
         columns = {n: np.asarray(table[n].to_numpy(), dtype=np.float64) for n in table.column_names}
         time = columns.pop(TIME)
     except (OSError, KeyError, ValueError, pa.ArrowException) as error:
@@ -78,13 +76,40 @@ def read_signals(path: Path) -> SignalFile:
         ) from None
     channels: dict[str, dict[str, FloatArray]] = {}
     # Both may hold dots; without the list of variants the last dot parts them.
-    variants = sorted(json.loads(facts.get("variants", "[]")), key=len, reverse=True)
+    variants = sorted(facts.variants, key=len, reverse=True)
     for column, values in columns.items():
         variant = next((v for v in variants if column.endswith(f".{v}")), column.rpartition(".")[2])
         channel = column.removesuffix(f".{variant}")
         channels.setdefault(channel, {})[variant] = values
-    role = facts.get("role", path.parent.name)
-    return SignalFile(role, facts.get("name", path.stem), time, channels, units)
+    return SignalFile(facts.role, facts.name, time, channels, facts.units)
+
+
+@dataclass(frozen=True)
+class _Facts:
+    """What the metadata of a signal file say."""
+
+    role: str
+    name: str
+    units: dict[str, str]
+    variants: list[str]
+
+
+def _facts(path: Path, schema: pa.Schema) -> _Facts:
+    found = {key.decode(): value.decode() for key, value in (schema.metadata or {}).items()}
+    return _Facts(
+        role=found.get("role", path.parent.name),
+        name=found.get("name", path.stem),
+        units=json.loads(found.get("units", "{}")),
+        variants=json.loads(found.get("variants", "[]")),
+    )
+
+
+def signal_units(folder: Path) -> dict[str, str]:
+    """Unit by channel over all signal files of a study folder."""
+    units: dict[str, str] = {}
+    for path in signal_paths(folder):
+        units.update(_facts(path, pq.read_schema(path)).units)
+    return units
 
 
 def signal_paths(folder: Path) -> list[Path]:

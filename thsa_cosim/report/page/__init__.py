@@ -5,7 +5,7 @@
 ``chart``         plotly figures as dictionaries; text escaped, arrays packed
 ``populations``   the search's population by generation, from the journal
 ``summary``, ``parameters``, ``friction``, ``comparison``, ``convergence``, ``correlation``, ``gains``, ``responses``,
-``plane``, ``schedule``, ``pareto``, ``diagnosis``, ``failures``, ``provenance``: one section each
+``plane``, ``schedule``, ``pareto``, ``diagnosis``, ``structure``, ``failures``, ``provenance``: a section each
 ``write``         all of them in order, rendered by ``templates`` into one file
 
 To add a section: a module with a function that takes a part of a study and returns a section or None, and its place

@@ -199,6 +199,20 @@ class Chart:
             extra["line"] = {"color": marker["color"], "width": 1.5}
         self.add(*at, name, type="scatter", mode=mode, x=packed(x), y=packed(y), marker=marker, **extra)
 
+    def bars(
+        self,
+        labels: Sequence[str],
+        heights: Sequence[float | None],
+        name: str,
+        *,
+        at: tuple[int, int] = (0, 0),
+        colour: str | Sequence[str] = INK,
+    ) -> None:
+        """Bars beside each other over ``labels``; ``colour`` for all of them, or one each."""
+        shown = [plain(label) for label in labels]
+        shade = colour if isinstance(colour, str) else list(colour)
+        self.add(*at, name, type="bar", x=shown, y=list(heights), marker={"color": shade})
+
     def band(
         self,
         x: ArrayLike,

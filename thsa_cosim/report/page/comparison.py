@@ -39,6 +39,11 @@ def comparison(part: Part) -> Section | None:
     return Section(f"{part.prefix}signals", "Measured against simulated", tuple(blocks))
 
 
+def role_text(role: str) -> str:
+    """``fitted`` or ``held out``."""
+    return {"fit": "fitted", "validate": "held out"}.get(role, role)
+
+
 def _temperature(value: float | None) -> Cell:
     return Cell(DASH if value is None else degrees(value).removesuffix(" °C"), value)
 
@@ -73,9 +78,7 @@ def _errors(recordings: list[Json]) -> Table:
             rows.append(
                 (
                     text_cell(recording["name"]),
-                    text_cell(
-                        {"fit": "fitted", "validate": "held out"}.get(recording["role"], recording["role"])
-                    ),
+                    text_cell(role_text(recording["role"])),
                     _temperature(recording.get("temperature_degC")),
                     text_cell(name),
                     text_cell(error["unit"]),
@@ -103,7 +106,7 @@ def recording_folds(part: Part, signals: list[SignalFile]) -> list[Block]:
         known = facts.get((found.role, found.name), {})
         temperature = known.get("temperature_degC")
         where = f", {degrees(temperature)}" if temperature is not None else ""
-        role = {"fit": "fitted", "validate": "held out"}.get(found.role, found.role)
+        role = role_text(found.role)
         figure = compare_figure(f"{part.prefix}signals-{k}", found, known.get("error", {}))
         folds.append(Fold(f"{found.name} ({role}{where})", (figure,), is_open=k == opened))
     return folds
@@ -150,7 +153,8 @@ def compare_figure(name: str, found: SignalFile, errors: Json) -> Figure:
             )
             residual = values - variants["measured"]
             drawn.line(found.time, residual, label, at=below, colour=colour, width=1.0, thin=True)
-        drawn.title(_heading(channel, unit, errors.get(channel)), *above)
+        if channel in errors:
+            drawn.title(_heading(channel, unit, errors[channel]), *above)
         drawn.axes(*above, y=f"{channel} [{unit}]")
         drawn.axes(*below, y=f"residual [{unit}]", x="time [s]" if k == len(channels) - 1 else "")
     samples = count(found.time.size, "sample")
@@ -160,9 +164,7 @@ def compare_figure(name: str, found: SignalFile, errors: Json) -> Figure:
     )
 
 
-def _heading(channel: str, unit: str, error: Json | None) -> str:
-    if error is None:
-        return channel
+def _heading(channel: str, unit: str, error: Json) -> str:
     ratio = noise_ratio(error)
     times = "" if ratio is None else f" = {number(ratio, 3)} × noise"
     share = percent(error.get("nrmse"))

@@ -8,6 +8,7 @@ from thsa_cosim.report.page.content import Block, Column, Figure, Section, Table
 from thsa_cosim.report.page.folder import Json, Part
 from thsa_cosim.report.page.populations import Evolution, evolutions
 from thsa_cosim.report.page.text import number_cell, search_label, text_cell
+from thsa_cosim.signals import FloatArray
 from thsa_cosim.tune.combine import INFEASIBLE
 
 #: Panels side by side.
@@ -97,13 +98,19 @@ def _figure(part: Part, found: list[Evolution]) -> Figure:
             y=("cost [1]" if part.kind == "tune" else "cost per sample [1]") if first_column else "",
             log_y=True,
             # Labels between the powers of ten clutter a panel that spans several of them.
-            dtick_y=1 if np.nanmax(high) > 30.0 * np.nanmin(low) else None,
+            dtick_y=1 if _spans_decades(low, high) else None,
             x_options={"dtick": max(1, -(-len(generation) // 6)), "rangemode": "tozero"},
         )
     what = "Cost (equation 7 with requirements; vectors that break a hard one are left out)"
     if part.kind != "tune":
         what = "Cost (equation 6) per sample, 1 where only the noise is left; before the polish"
     return drawn.build(f"{what}, against generation, over the population of {part.population} vectors.")
+
+
+def _spans_decades(low: FloatArray, high: FloatArray) -> bool:
+    """Whether finite costs from ``low`` to ``high`` differ thirtyfold; a search that found none has only NaN."""
+    found = np.isfinite(low) & np.isfinite(high)
+    return bool(found.any() and np.max(high[found]) > 30.0 * np.min(low[found]))
 
 
 def _ends_table(part: Part, ends: list[Json]) -> Table:

@@ -13,6 +13,7 @@ from thsa_cosim.report.page.folder import Json, Part
 from thsa_cosim.report.page.gains import limits_of, term_label, term_rows
 from thsa_cosim.report.page.responses import set_colours
 from thsa_cosim.report.page.text import count, number_cell, text_cell
+from thsa_cosim.signals import FloatArray
 
 CHECK = "schedule_check.csv"
 
@@ -92,8 +93,7 @@ def _check_figure(part: Part, result: Json, axis: str) -> Figure:
         for label, terms in sets.items():
             values = np.abs(terms[metric]) if metric == "steady_state_error" else terms[metric]
             x = np.unique(places[label])
-            worst = np.nanmax if upper else np.nanmin
-            y = [float(worst(values[places[label] == one])) for one in x]
+            y = [_worst(values[places[label] == one], upper) for one in x]
             drawn.line(x, y, label, at=at, colour=colours[label], width=1.8)
         drawn.level(requirement["maximum" if upper else "minimum"], at=at)
         shown = "" if requirement["unit"] == "1" else f" {requirement['unit']}"
@@ -109,6 +109,12 @@ def _check_figure(part: Part, result: Json, axis: str) -> Figure:
 
 
 Terms = dict[str, "np.ndarray[tuple[int], np.dtype[np.float64]]"]
+
+
+def _worst(values: FloatArray, upper: bool) -> float:
+    """The worst of the values that exist (a response may never settle); NaN if none does."""
+    found = values[~np.isnan(values)]
+    return float(np.max(found) if upper else np.min(found)) if found.size else float("nan")
 
 
 def _read_check(path: Path, axis: str) -> tuple[Terms, dict[str, Terms]]:

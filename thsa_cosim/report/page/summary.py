@@ -1,7 +1,8 @@
 """The page's first section: what was asked, what came out, how sure that is."""
 
-from thsa_cosim.report.page.comparison import MET, MISSED, noise_ratio, ratio_mark
+from thsa_cosim.report.page.comparison import MET, MISSED, noise_ratio, ratio_mark, role_text
 from thsa_cosim.report.page.content import Block, Cell, Column, Facts, Section, Table, Text
+from thsa_cosim.report.page.diagnosis import verdict
 from thsa_cosim.report.page.failures import evaluations, failed
 from thsa_cosim.report.page.folder import Json, Part, Study
 from thsa_cosim.report.page.gains import term_label
@@ -26,8 +27,8 @@ _STATUS = {
 }
 
 
-def summary(study: Study, diagnosed: tuple[Block, ...] = ()) -> Section:
-    """The section for any kind of study; ``diagnosed`` is what a diagnosis has to say first."""
+def summary(study: Study) -> Section:
+    """The section for any kind of study."""
     blocks: list[Block] = []
     status = study.status
     if status in _STATUS:
@@ -35,14 +36,13 @@ def summary(study: Study, diagnosed: tuple[Block, ...] = ()) -> Section:
         again = f" Continue with: {command}" if command and status != "running" else ""
         blocks.append(Text(_STATUS[status] + again, "bad" if status == "stopped" else ""))
     blocks.append(Facts([("asked", text) for text in _asked(study)]))
-    blocks += diagnosed
-    for part in study.parts:
-        if part.result is None:
-            blocks.append(Text(f"{part.title}: {_so_far(part)}"))
+    blocks += [Text(f"{part.title}: {_so_far(part)}") for part in study.parts if part.result is None]
     result = study.whole.result
     if result is not None:
         if result.get("points"):
             blocks.append(_found_table(result))
+        if study.whole.kind == "diagnose":
+            blocks += verdict(result)
         if study.whole.kind == "tune":
             blocks += _tuned(result)
         errors = _errors(study)
@@ -84,6 +84,9 @@ def _question(part: Part) -> str:
             else ""
         )
         return f"Find {listing(names)} of {fmu}{where}{data}; {search}."
+    if part.kind == "diagnose":
+        data = " with held-out recordings" if result.get("before", {}).get("validate") else ""
+        return f"Find out which physical effect {fmu} lacks to explain the recordings{data}."
     if part.kind == "simulate":
         recordings = result.get("recordings", [])
         return f"Simulate {fmu} with {count(len(recordings), 'recording')} and compare." if recordings else ""
@@ -205,7 +208,7 @@ def _errors(study: Study) -> Table | None:
         cells = (significant_cell(error["rmse"]), significant_cell(error.get("noise")))
         rows.append(
             (
-                text_cell({"fit": "fitted", "validate": "held out"}.get(role, role)),
+                text_cell(role_text(role)),
                 text_cell(name),
                 text_cell(error["unit"]),
                 *cells,

@@ -17,6 +17,7 @@ from thsa_cosim.report.page.comparison import comparison
 from thsa_cosim.report.page.content import Block, Figure, Fold, Section
 from thsa_cosim.report.page.convergence import convergence
 from thsa_cosim.report.page.correlation import correlation
+from thsa_cosim.report.page.diagnosis import before_after, candidates, recordings
 from thsa_cosim.report.page.failures import failures
 from thsa_cosim.report.page.folder import Part, Study, read_study
 from thsa_cosim.report.page.friction import friction
@@ -27,6 +28,7 @@ from thsa_cosim.report.page.plane import plane
 from thsa_cosim.report.page.provenance import provenance
 from thsa_cosim.report.page.responses import responses
 from thsa_cosim.report.page.schedule import schedule
+from thsa_cosim.report.page.structure import attribution, structure
 from thsa_cosim.report.page.summary import summary
 
 PAGE = "report.html"
@@ -37,6 +39,7 @@ SectionOf = Callable[[Part], Section | None]
 SECTIONS: dict[str, tuple[SectionOf, ...]] = {
     "identify": (comparison, convergence, correlation),
     "simulate": (comparison,),
+    "diagnose": (attribution, before_after, structure, recordings, candidates, convergence),
     "tune": (gains, responses, plane, schedule, pareto, convergence),
 }
 

@@ -69,6 +69,8 @@ def small() -> dict[str, Any]:
     data["recordings"]["columns"]["w_cmd"]["interpolation"] = "linear"
     data["recordings"]["columns"]["w_cmd"]["smooth"] = "piecewise-linear"
     data["recordings"]["columns"]["w_cmd"]["noise"] = 0.1
+    data["recordings"]["parts"] = [{"name": "begin", "use": "fit", "stop": 0.3}]
+    data["force"] = {"position": "w_m", "force": "i_q", "mass": "motor.J", "band": 10.0, "period": 0.1}
     data["parameters"][1]["zero"] = ["motor.gain"]
     data["cost"]["also"] = ["huber"]
     data["search"]["profile"] = ["R_s"]
@@ -78,7 +80,7 @@ def small() -> dict[str, Any]:
 
 def simulate() -> dict[str, Any]:
     data = small()
-    for key in ("parameters", "search"):
+    for key in ("parameters", "search", "force"):
         del data[key]
     return data | {"kind": "simulate", "outputs": ["flux"]}
 

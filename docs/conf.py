@@ -16,7 +16,7 @@ html_title = "thsa-cosim"
 html_math_renderer = "mathml"
 html_show_sphinx = False
 
-myst_enable_extensions = ["dollarmath"]
+myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 # Notebooks are executed by tests/test_notebooks.py; the pages show the outputs that they hold.
 nb_execution_mode = "off"

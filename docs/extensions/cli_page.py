@@ -29,7 +29,9 @@ def cli_page() -> str:
         parts.append(f"## {name}\n\n```text\nthsa-cosim {name} {usage}\n```\n")
         parts.append(inspect.cleandoc(command.help or "") + "\n")
         rows = [
-            _row(p, own) for p in command.get_params(own) if isinstance(p, click.Option) and p.name != "help"
+            _row(p, own)
+            for p in command.get_params(own)
+            if isinstance(p, click.Option) and "--help" not in p.opts
         ]
         if rows:
             parts.append("| option | meaning |\n|---|---|\n" + "\n".join(rows) + "\n")

@@ -77,12 +77,14 @@ def warm_up() -> None:
 
 
 def prepare(material: Path, scratch: Path, deadline: float) -> Verdict | None:
-    """Run everything with healthy input, keep one finished study; return a verdict that is no success."""
+    """Run everything with healthy input, keep the finished studies; return a verdict that is no success."""
     for verdict in run(healthy_cases(material, scratch / "healthy"), 1, deadline, keep=True):
         if verdict.code != 0 or verdict.findings:
             return verdict
-        if verdict.case.name == "healthy-motor":
-            (verdict.case.folder / STUDY).rename(material / FINISHED)
+        if verdict.case.writes_result:
+            scenario = next(a for a in verdict.case.arguments if a.endswith(".toml"))
+            (material / FINISHED).mkdir(exist_ok=True)
+            (verdict.case.folder / STUDY).rename(material / FINISHED / scenario)
     return None
 
 

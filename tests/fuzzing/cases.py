@@ -1,5 +1,6 @@
 """One case: a folder with mutated input and the command line to run there, drawn from ``(kind, seed, index)``."""
 
+import json
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ COMMANDS = {
 STUDY = "study"
 """The only folder that a command may write to, in the folder of its case."""
 FINISHED = "finished"
-"""Folder of the material with a finished study of ``motor.toml``."""
+"""Folder of the material with a finished study of every scenario."""
 
 
 @dataclass(frozen=True)
@@ -99,12 +100,18 @@ def _fmu(rng: Random, name: str, material: Path, base: Path) -> Case:
 
 
 def _study(rng: Random, name: str, material: Path, base: Path) -> Case:
-    case = _case(name, base, material, "identify", "motor.toml")
+    run = rng.choice(("motor.toml", "motor.toml", "stages.toml", "tuning.toml"))
+    shows = rng.random() < 0.4
+    case = (
+        _case(name, base, material, "report", STUDY)
+        if shows
+        else _case(name, base, material, COMMANDS[run], run)
+    )
     study = case.folder / STUDY
-    shutil.copytree(material / FINISHED, study)
-    files = sorted(p for p in study.rglob("*") if p.is_file() and p.suffix in (".json", ".csv"))
+    shutil.copytree(material / FINISHED / run, study)
+    files = sorted(p for p in study.rglob("*") if p.suffix in (".json", ".csv", ".parquet", ".toml"))
     # The files that a continued study reads decide; the others are only overwritten.
-    read = [p for p in files if p.name in ("journal.csv", "study.json")]
+    read = [p for p in files if shows or p.name in ("journal.csv", "study.json")]
     path = rng.choice(read if rng.random() < 0.8 else files)
     match rng.randrange(12):
         case 0:
@@ -112,9 +119,12 @@ def _study(rng: Random, name: str, material: Path, base: Path) -> Case:
         case 1:
             path.unlink()
             path.mkdir()
-        case 2 | 3 | 4 | 5 | 6:
+        case 2 | 3 | 4 | 5 | 6 if path.suffix != ".parquet":
             text = mutate_text(rng, path.read_text(encoding="utf-8"))
             path.write_text(text, encoding="utf-8", errors="replace")
+        case 7 | 8 if path.suffix == ".json":
+            table = scenarios.mutate_tables(rng, json.loads(path.read_text(encoding="utf-8")))
+            path.write_text(json.dumps(table, default=str), encoding="utf-8")
         case _:
             path.write_bytes(mutate_bytes(rng, path.read_bytes()))
     return case

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from thsa_cosim.cli.dry_run import dry_run_option, show_forecast
 from thsa_cosim.cli.options import Interrupted, Place, StudyOptions, console, study_options
 from thsa_cosim.errors import ThsaCosimError
 
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
     default=None,
     help="Write the FMU anew with what was identified; default: only of a scenario with stages.",
 )
-def identify(options: StudyOptions, export_fmu: bool | None) -> None:
+@dry_run_option
+def identify(options: StudyOptions, export_fmu: bool | None, dry_run: bool) -> None:
     """Identify parameters from recordings as SCENARIO says, point by point over temperature."""
     from thsa_cosim.report.parameter_files import write_identified_fmu
     from thsa_cosim.report.progress import ProgressDisplay
@@ -34,6 +36,9 @@ def identify(options: StudyOptions, export_fmu: bool | None) -> None:
 
     loaded = load_study(options.scenario, **options.overrides)
     options.check_kind(loaded.kind, "identify")
+    if dry_run:
+        show_forecast(options, loaded)
+        return
     place = options.place()
     folder = place["folder"]
     repeat = options.repeat("identify", folder)

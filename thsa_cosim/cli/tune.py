@@ -2,13 +2,15 @@
 
 import click
 
+from thsa_cosim.cli.dry_run import dry_run_option, show_forecast
 from thsa_cosim.cli.options import Interrupted, StudyOptions, console, study_options
 from thsa_cosim.errors import InputError, StudyError
 
 
 @click.command()
 @study_options
-def tune(options: StudyOptions) -> None:
+@dry_run_option
+def tune(options: StudyOptions, dry_run: bool) -> None:
     """Tune gains for the commands and conditions that SCENARIO describes; schedule them if it asks."""
     from thsa_cosim.report.progress import ProgressDisplay
     from thsa_cosim.report.study import RESULT
@@ -21,6 +23,9 @@ def tune(options: StudyOptions) -> None:
             f"{options.scenario}: a tuning describes its command itself; leave out --fit and --validate."
         )
     loaded = load_tune(options.scenario, seed=options.seed, fmu=options.fmu)
+    if dry_run:
+        show_forecast(options, loaded)
+        return
     place = options.place()
     folder = place["folder"]
     repeat = options.repeat("tune", folder)

@@ -16,6 +16,7 @@ from thsa_cosim.batch import Experiment, Job, Journal, JournalRow, Outcome, Runn
 from thsa_cosim.costs.channels import ResidualReducer, TermsReducer
 from thsa_cosim.identify.problem import Case, PointProblem
 from thsa_cosim.identify.results import Progress
+from thsa_cosim.scenario import SearchSpec
 from thsa_cosim.signals import FloatArray, Signals
 
 #: Seconds between two writes to the journal: what a power cut may cost.
@@ -55,6 +56,15 @@ class Reply:
     residuals: tuple[FloatArray | None, ...]
     signals: tuple[tuple[Signals, ...] | None, ...]
     reasons: tuple[str, ...]
+
+
+def planned_vectors(search: SearchSpec, dimension: int) -> int:
+    """Return how many vectors a search over ``dimension`` parameters may take: its generations, and its polish.
+
+    The polish is expected to take six steps with central differences.
+    """
+    polish = 6 * (2 * dimension + 1) if search.polish else 0
+    return search.population * (search.generations + 1) + 2 + polish
 
 
 def terms_experiment(case: Case, error: str) -> Experiment:
@@ -137,11 +147,10 @@ class Evaluator:
         self._run(jobs, owners, requests, replies)
         return [reply.freeze() for reply in replies]
 
-    def plan(self, evaluations: int, polish: bool) -> None:
-        """Expect so many evaluations per point for the evolution, and some more for a polish."""
+    def plan(self, search: SearchSpec) -> None:
+        """Expect at every point what ``search`` may take."""
         for k, point in enumerate(self._points):
-            more = 2 + (6 * (2 * point.space.dimension + 1) if polish else 0)
-            self._share[k] = (evaluations + more) * len(point.cases)
+            self._share[k] = planned_vectors(search, point.space.dimension) * len(point.cases)
         self.planned = sum(self._share)
         self.report()
 

@@ -110,7 +110,7 @@ class _Study:
             seed=self._scenario.seed,
             tolerance=spec.tolerance,
         )
-        evaluator.plan(settings.population * (settings.generations + 1), spec.polish)
+        evaluator.plan(spec)
 
         def task(index: int) -> Callable[[Callable[[Request], Reply]], PointSearch]:
             def on_generation(generation: Generation) -> None:

@@ -1,0 +1,157 @@
+"""What a study would run, and how long that takes: counted from the scenario, timed on a few of its runs."""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from thsa_cosim.batch import Experiment, Job, Outcome
+from thsa_cosim.identify.evaluate import planned_vectors
+from thsa_cosim.identify.problem import build_case
+from thsa_cosim.parameters import ParameterSpace
+from thsa_cosim.scenario import Scenario, SimulationSpec, StagedScenario, TuneScenario, open_runner
+from thsa_cosim.tune.problem import build_groups
+
+SAMPLE = 12
+"""Runs that are timed, besides one per worker to warm up."""
+LONG_S = 5.0
+"""Runs that take longer are not timed again."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """One search of a study: at most ``vectors`` parameter vectors, each simulated once per ``cases``."""
+
+    label: str
+    cases: tuple[str, ...]
+    vectors: int
+
+    @property
+    def runs(self) -> int:
+        """Simulations at most."""
+        return self.vectors * len(self.cases)
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a scenario would run on ``workers`` processes; ``seconds`` is for all of it, at most.
+
+    ``timed`` runs gave ``run_s``, the wall time between two finished runs; ``failures`` of them by reason.
+    ``also`` are simulations besides the searches (a map of the cost, held-out recordings, comparisons).
+    """
+
+    title: str
+    searches: tuple[Search, ...]
+    also: int
+    workers: int
+    timed: int
+    run_s: float
+    failures: dict[str, int]
+
+    @property
+    def runs(self) -> int:
+        """Simulations at most."""
+        return sum(search.runs for search in self.searches) + self.also
+
+    @property
+    def seconds(self) -> float:
+        """Wall time at most, s: a search that converges ends before its last generation."""
+        return self.runs * self.run_s
+
+
+Ask = tuple[Experiment, ParameterSpace, str]
+"""An experiment, what is searched in it, and the recording that its parameters may belong to."""
+
+
+def forecast(
+    study: Scenario | StagedScenario | TuneScenario, *, workers: int = 1, cluster: str | None = None
+) -> tuple[Forecast, ...]:
+    """Forecast a scenario: one entry, or one per stage of a scenario in stages.
+
+    A few runs with random parameters are simulated for it; nothing is written.
+    """
+    if isinstance(study, StagedScenario):
+        return tuple(_of_recordings(stage.scenario, workers, cluster) for stage in study.stages)
+    if isinstance(study, TuneScenario):
+        return (_of_tuning(study, workers, cluster),)
+    return (_of_recordings(study, workers, cluster),)
+
+
+def _of_recordings(scenario: Scenario, workers: int, cluster: str | None) -> Forecast:
+    searches, asks = [], []
+    for point in scenario.points if scenario.kind != "simulate" else ():
+        cases = [build_case(scenario, recording, point.fixed) for recording in point.fit]
+        vectors = planned_vectors(scenario.search, point.space.dimension)
+        searches.append(Search(point.label, tuple(case.name for case in cases), vectors))
+        asks += [(case.experiment(f"fit/{case.name}", None), point.space, case.name) for case in cases]
+    alone = scenario.validate if searches else (*scenario.fit, *scenario.validate)
+    asks += [
+        (
+            build_case(scenario, r, scenario.fixed).experiment(f"alone/{r.name}", None),
+            ParameterSpace(()),
+            r.name,
+        )
+        for r in alone
+    ]
+    title = scenario.title or scenario.path.stem
+    return _timed(title, searches, len(alone), asks, scenario.simulation, scenario.seed, workers, cluster)
+
+
+def _of_tuning(scenario: TuneScenario, workers: int, cluster: str | None) -> Forecast:
+    groups = build_groups(scenario)
+    spec, space = scenario.search, scenario.parameters
+    searches = [
+        Search(
+            group.label,
+            tuple(case.condition.label for case in group.cases),
+            planned_vectors(spec, len(space)),
+        )
+        for group in groups
+    ]
+    sets = 2 + len(scenario.compare)
+    also = sets * len(groups[0].cases)
+    if scenario.surface is not None:
+        also += scenario.surface.points**2 * len(groups[0].cases)
+    if scenario.schedule is not None:
+        also += (1 + sets) * int(np.prod([len(axis.values) for axis in scenario.schedule.check]))
+    asks = [(case.experiment, space, "") for case in groups[0].cases]
+    return _timed(scenario.title, searches, also, asks, scenario.simulation, scenario.seed, workers, cluster)
+
+
+def _timed(
+    title: str,
+    searches: Sequence[Search],
+    also: int,
+    asks: Sequence[Ask],
+    simulation: SimulationSpec,
+    seed: int,
+    workers: int,
+    cluster: str | None,
+) -> Forecast:
+    chosen = [asks[k] for k in np.unique(np.linspace(0, len(asks) - 1, SAMPLE).astype(int))]
+    random = np.random.default_rng(seed)
+
+    def jobs(count: int) -> list[Job]:
+        drawn = []
+        for k in range(count):
+            experiment, space, recording = chosen[k % len(chosen)]
+            values = space.decode(random.random(len(space)))
+            drawn.append(Job(experiment.name, space.assignments(values, recording) if len(space) else {}))
+        return drawn
+
+    with open_runner(simulation, [experiment for experiment, *_ in chosen], workers, cluster) as runner:
+        outcomes, seconds = _clock(runner.run, jobs(workers))
+        if seconds < LONG_S:
+            # The first run of a worker loads the FMU and compiles; the others are what a study is made of.
+            outcomes, seconds = _clock(runner.run, jobs(max(SAMPLE, 2 * workers)))
+    failures = Counter(outcome.reason for outcome in outcomes if not outcome.ok)
+    return Forecast(
+        title, tuple(searches), also, workers, len(outcomes), seconds / len(outcomes), dict(failures)
+    )
+
+
+def _clock(run: Callable[[Sequence[Job]], list[Outcome]], jobs: Sequence[Job]) -> tuple[list[Outcome], float]:
+    begin = time.perf_counter()
+    return run(jobs), time.perf_counter() - begin

@@ -280,9 +280,10 @@ def test_study_in_stages_that_runs_shows_the_stages_that_have_begun(tmp_path: Pa
         open_study(place, studies.identity("identify"), studies.about(title=f"{name} bench"))
         studies.write_journal(place, ["-30 degC"], ["R_s"], ["i_q"], generations=number)
     found = read_study(tmp_path)
-    assert found.status == "stopped"
+    assert found.status == "stopped"  # no process writes a journal
     assert [part.name for part in found.parts] == ["motor", "screw"]
     text = write_page(tmp_path).read_text()
+    assert f"nothing is running; what is done is kept. Continue with: {studies.COMMAND}" in text
     assert "6 vectors evaluated of at most 24 in 1 search, 1 failed so far." in text
     assert "12 vectors evaluated of at most 24 in 1 search, 2 failed so far." in text
     for name in ("motor-convergence", "screw-convergence", "motor-part", "screw-part"):

@@ -11,6 +11,7 @@ import traceback
 import click
 
 from thsa_cosim import __version__
+from thsa_cosim.cli.diagnose import diagnose
 from thsa_cosim.cli.identify import identify
 from thsa_cosim.cli.models import check, export
 from thsa_cosim.cli.options import Interrupted
@@ -20,7 +21,7 @@ from thsa_cosim.cli.tune import tune
 from thsa_cosim.errors import ThsaCosimError, did_you_mean
 
 #: In the order in which a newcomer meets them; help lists them so.
-COMMANDS: tuple[click.Command, ...] = (export, check, simulate, identify, tune, report)
+COMMANDS: tuple[click.Command, ...] = (export, check, simulate, identify, tune, diagnose, report)
 
 
 class _Cli(click.Group):

@@ -104,3 +104,32 @@ def duration(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
     return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+class StepDisplay:
+    """A context manager that is called with a sentence at every step: a spinner, or plain lines in a pipe."""
+
+    def __init__(self, console: Console, *, quiet: bool = False) -> None:
+        self._console = console
+        self._quiet = quiet
+        self._begin = time.monotonic()
+        self._status = None if quiet or not console.is_terminal else console.status("starting")
+
+    def __enter__(self) -> Self:
+        if self._status is not None:
+            self._status.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._status is not None:
+            self._status.stop()
+
+    def __call__(self, step: str) -> None:
+        """Show ``step`` with the seconds since the beginning."""
+        text = f"{time.monotonic() - self._begin:6.1f} s  {step}"
+        if self._status is not None:
+            self._status.update(text)
+        elif not self._quiet:
+            self._console.print(text, highlight=False, markup=False, soft_wrap=True)

@@ -1,9 +1,8 @@
 """A scenario against its FMU: every variable exists, has the right role, unit and range."""
 
 import fnmatch
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from collections.abc import Sequence
 from pathlib import Path
 
 from thsa_cosim.errors import ParameterError, ScenarioError, UnitError, did_you_mean

@@ -63,7 +63,7 @@ class ForceSpec:
 
 @dataclass(frozen=True)
 class BalanceSpec:
-    """An equation between measured signals: ``left`` ≈ Σ c_k ``terms[k]``, below ``band`` Hz, where ``moving`` moves."""
+    """``left`` ≈ Σ c_k ``terms[k]`` between measured signals, below ``band`` Hz, while ``moving`` moves."""
 
     name: str
     unit: str

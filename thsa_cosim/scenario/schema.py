@@ -271,7 +271,7 @@ class DiagnoseOptionsTable(Table):
     """Modelica class with effect slots, such as ``"THSA.Actuator"``; left out: the FMU is a black box."""
     package: Name = "../modelica/THSA"
     """Folder of its package, relative to the scenario."""
-    effects: list[Name] = []
+    effects: list[Name] = Field(default_factory=list)
     """Names from the catalogue to try; none: all."""
     catalogue: Name | None = None
     """A folder with effects of your own, one ``.py`` file each."""
@@ -285,7 +285,7 @@ class DiagnoseOptionsTable(Table):
     """... the one that loads it: what a separating experiment may vary."""
     empirical: bool = False
     """Add an empirical law to the model where structure is left that no effect explains."""
-    balances: list[BalanceTable] = []
+    balances: list[BalanceTable] = Field(default_factory=list)
 
 
 class DiagnoseParameterTable(ParameterTable):

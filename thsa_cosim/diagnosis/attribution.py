@@ -1,0 +1,332 @@
+"""Which effects the recordings ask for: screen, refine, score on held-out recordings, accept one, and again.
+
+Forward selection (each step against the model so far, declared parameters fitted along), then every accepted effect must
+still be needed beside the others.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from thsa_cosim.diagnosis.bench import Bench
+from thsa_cosim.diagnosis.candidate import Candidate
+from thsa_cosim.diagnosis.fit import Fit, columns, refine
+from thsa_cosim.diagnosis.screen import Proposal, screen, unknowns_of
+from thsa_cosim.diagnosis.structure import block_gains, block_t, structure
+from thsa_cosim.diagnosis.threshold import largest_gains, probability, threshold
+from thsa_cosim.diagnosis.unknowns import Unknowns
+from thsa_cosim.signals import FloatArray
+
+#: An effect must be this many standard errors from nothing, and its held-out gain from chance.
+SIGMAS = 3.0
+#: The share of the structure left that a first and a further effect must explain on the held-out recordings.
+FIRST_SHARE, NEXT_SHARE = 0.15, 0.4
+#: Structure below this many standard deviations of the noise (rms over all channels) is not worth an effect.
+SMALLEST_STRUCTURE = 0.05
+#: Rivals that leave less than this share of the gain unexplained cannot be told apart.
+TIE_SHARE = 0.005
+#: How many effects are refined after each screening.
+REFINED = 6
+
+Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """A candidate fitted together with the declared parameters, and its score on the held-out recordings.
+
+    ``fit_gain``, ``held_out_gain``: decrease of the squared residuals in variances of the noise. ``t``: the held-out
+    gain over blocks of time in its own standard errors. ``share``: of the held-out structure explained.
+    """
+
+    proposal: Proposal
+    fit: Fit
+    validate: FloatArray
+    fit_gain: float
+    held_out_gain: float
+    t: float
+    share: float
+
+    @property
+    def candidate(self) -> Candidate:
+        """The candidate."""
+        return self.proposal.candidate
+
+    def parameter(self, variable: str) -> float:
+        """Fitted value of one of its parameters."""
+        return float(self.fit.vector[self.fit.unknowns.names.index(variable)])
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """One screening: its threshold, what was proposed, what was refined (best first) and what was decided."""
+
+    threshold: float
+    proposals: tuple[Proposal, ...]
+    scored: tuple[Scored, ...]
+    accepted: Scored | None
+    reason: str
+    gains: FloatArray
+
+    def probability(self, gain: float) -> float:
+        """Probability that chance makes at least ``gain``."""
+        return probability(gain, self.gains)
+
+
+@dataclass(frozen=True, eq=False)
+class Attribution:
+    """The declared model's fit, the rounds, the accepted effects in order, and the model with them."""
+
+    base: Fit
+    base_validate: FloatArray
+    rounds: tuple[Round, ...]
+    accepted: tuple[Scored, ...]
+    rivals: tuple[Scored, ...]
+    final: Fit
+    final_validate: FloatArray
+    notes: tuple[str, ...] = field(default=())
+
+
+def attribute(
+    bench: Bench,
+    unknowns: Unknowns,
+    candidates: Sequence[Candidate],
+    scan: Scan,
+    *,
+    seed: int,
+    most: int = 3,
+    say: Say = lambda _: None,
+) -> Attribution | None:
+    """Find the effects; None if the declared model cannot be simulated at its start."""
+    say("fitting the declared model")
+    base = refine(bench, unknowns, unknowns.start, iterations=10)
+    if base is None:
+        return None
+    held = bench.residuals(unknowns, base.vector[None, :], "validate")[0]
+    if held is None:
+        return None
+    current, current_held = base, held
+    rounds: list[Round] = []
+    accepted: list[Scored] = []
+    for number in range(most):
+        say(
+            f"screening {len(candidates)} candidates"
+            + (f" beside {accepted[-1].candidate.name}" if accepted else "")
+        )
+        taken = {s.candidate.key for s in accepted}
+        proposals = screen(bench, current, [c for c in candidates if c.key not in taken], scan(current))
+        gains = largest_gains(current, proposals, seed + number)
+        limit = threshold(gains)
+        scored = _refine_best(bench, current, current_held, proposals, limit, say)
+        choice, reason = _decide(bench, current_held, scored, limit, first=not accepted)
+        if choice is not None:
+            say(f"fitting {choice.candidate.name} with all parameters")
+            choice = _polish(bench, choice, current, current_held)
+            problem = _implausible(choice)
+            if problem:
+                choice, reason = None, problem
+        rounds.append(Round(limit, tuple(proposals), tuple(scored), choice, reason, gains))
+        if choice is None:
+            break
+        accepted.append(choice)
+        current, current_held = choice.fit, choice.validate
+    accepted, current, current_held, notes = _prune(
+        bench, unknowns, base, held, accepted, current, current_held
+    )
+    rivals = _rivals(bench, rounds[0], base, held) if rounds and rounds[0].accepted is not None else ()
+    return Attribution(
+        base, held, tuple(rounds), tuple(accepted), rivals, current, current_held, tuple(notes)
+    )
+
+
+def _refine_best(
+    bench: Bench, current: Fit, held: FloatArray, proposals: Sequence[Proposal], limit: float, say: Say
+) -> list[Scored]:
+    """The best proposals of the best effects, fitted with the declared parameters, best on held-out data first."""
+    chosen: list[Proposal] = []
+    per_effect: dict[str, int] = {}
+    worth = max(limit, 0.02 * proposals[0].gain) if proposals else limit
+    for proposal in proposals:
+        name = proposal.candidate.effect.name
+        if proposal.gain < worth or (name not in per_effect and len(per_effect) == REFINED):
+            continue
+        per_effect[name] = per_effect.get(name, 0) + 1
+        if per_effect[name] <= 2:
+            chosen.append(proposal)
+    scored = []
+    for proposal in chosen:
+        say(f"fitting {proposal.label}")
+        result = score(bench, current, held, proposal)
+        if result is not None:
+            scored.append(result)
+    return sorted(scored, key=lambda s: -s.held_out_gain)
+
+
+def score(
+    bench: Bench, current: Fit, held: FloatArray, proposal: Proposal, iterations: int = 5
+) -> Scored | None:
+    """Fit a proposal's parameters beside the current ones, whose Jacobian is kept, and score it; None if it fails."""
+    own = unknowns_of(proposal.candidate, proposal.shapes)
+    unknowns = current.unknowns.with_members([u for u in own if u.name not in current.unknowns.names])
+    members = unknowns.names
+    new = [k for k in range(len(members)) if k >= len(current.unknowns.members)]
+    amplitude = {
+        p.variable: float(a)
+        for p, a in zip(proposal.candidate.coefficients, proposal.amplitudes, strict=True)
+    }
+    start = unknowns.start
+    start[: current.vector.size] = current.vector
+    trials = []
+    for share in (1.0, 0.3, 0.1):
+        trial = start.copy()
+        for variable, value in amplitude.items():
+            trial[members.index(variable)] += share * value
+        trials.append(unknowns.clip(trial))
+    found = bench.residuals(unknowns, np.array(trials), "fit")
+    costs = [np.inf if r is None else float(r @ r) for r in found]
+    best = int(np.argmin(costs))
+    residual = found[best]
+    if residual is None:
+        return None
+    jacobian = np.concatenate([current.jacobian, np.zeros((residual.size, len(new)))], axis=1)
+    steps = np.concatenate([current.steps, np.full(len(new), 1e-2)])
+    jacobian[:, new], steps = columns(bench, unknowns, trials[best], residual, new, steps)
+    fit = refine(
+        bench,
+        unknowns,
+        trials[best],
+        residual=residual,
+        jacobian=jacobian,
+        steps=steps,
+        fresh=new,
+        iterations=iterations,
+        enough=3.0,
+    )
+    return None if fit is None else _scored(bench, proposal, fit, current, held)
+
+
+def _scored(bench: Bench, proposal: Proposal, fit: Fit, current: Fit, held: FloatArray) -> Scored | None:
+    validate = bench.residuals(fit.unknowns, fit.vector[None, :], "validate")[0]
+    if validate is None:
+        return None
+    gains = block_gains(bench.of("validate"), held, validate)
+    before, after = structure(bench.of("validate"), held), structure(bench.of("validate"), validate)
+    return Scored(
+        proposal=proposal,
+        fit=fit,
+        validate=validate,
+        fit_gain=current.misfit - fit.misfit,
+        held_out_gain=float(gains.sum()),
+        t=block_t(gains),
+        share=(before - after) / before if before > 0.0 else 0.0,
+    )
+
+
+def _decide(
+    bench: Bench, held: FloatArray, scored: Sequence[Scored], limit: float, *, first: bool
+) -> tuple[Scored | None, str]:
+    """The effect to accept, or None, and why."""
+    if not scored:
+        return None, "no candidate promises more than chance"
+    best = scored[0]
+    left = structure(bench.of("validate"), held) / held.size
+    wanted = FIRST_SHARE if first else NEXT_SHARE
+    if best.fit_gain < limit or best.held_out_gain < limit:
+        return None, f"{best.candidate.name} gains no more than chance on the held-out recordings"
+    if best.t < SIGMAS:
+        return (
+            None,
+            f"{best.candidate.name}: its held-out gain is within {SIGMAS:g} standard errors of chance",
+        )
+    if left < SMALLEST_STRUCTURE**2:
+        return None, "what is left is too small against the noise to be worth an effect"
+    if best.share < wanted:
+        return (
+            None,
+            f"{best.candidate.name} explains {100 * best.share:.0f} % of what is left, less than {100 * wanted:.0f} %",
+        )
+    return best, ""
+
+
+def _polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scored:
+    """The same with every Jacobian column fresh."""
+    fit = refine(
+        bench, choice.fit.unknowns, choice.fit.vector, residual=choice.fit.residual, steps=choice.fit.steps
+    )
+    if fit is None:
+        return choice
+    return _scored(bench, choice.proposal, fit, current, held) or choice
+
+
+def _implausible(choice: Scored) -> str:
+    """Why a fit cannot be believed, or ""."""
+    fit = choice.fit
+    inflation = max(1.0, fit.misfit / fit.residual.size)
+    stderr = fit.stderr(inflation)
+    sizes = []
+    for p in choice.candidate.coefficients:
+        k = fit.unknowns.names.index(p.variable)
+        sizes.append(abs(fit.vector[k] - p.neutral) / max(stderr[k], 1e-300))
+    if max(sizes) < SIGMAS:
+        return f"{choice.candidate.name}: the interval of its coefficient includes zero"
+    for u, x in zip(fit.unknowns.members, fit.vector, strict=True):
+        if u.declared and (x <= u.lower or x >= u.upper):
+            return (
+                f"{choice.candidate.name}: it drives the declared parameter {u.name} to the end of its range"
+            )
+    return ""
+
+
+def _prune(
+    bench: Bench,
+    unknowns: Unknowns,
+    base: Fit,
+    base_held: FloatArray,
+    accepted: list[Scored],
+    current: Fit,
+    held: FloatArray,
+) -> tuple[list[Scored], Fit, FloatArray, list[str]]:
+    """Drop every earlier effect that the later ones have made needless."""
+    notes: list[str] = []
+    while len(accepted) > 1:
+        for dropped in accepted[:-1]:
+            kept = [s for s in accepted if s is not dropped]
+            members = [u for s in kept for u in unknowns_of(s.candidate, s.proposal.shapes)]
+            fewer = unknowns.with_members(list({u.name: u for u in members}.values()))
+            vector = np.array([current.vector[current.unknowns.names.index(n)] for n in fewer.names])
+            fit = refine(bench, fewer, vector, iterations=6, enough=3.0)
+            validate = None if fit is None else bench.residuals(fewer, fit.vector[None, :], "validate")[0]
+            if fit is None or validate is None:
+                continue
+            lost = block_gains(bench.of("validate"), validate, held)
+            total = float(base_held @ base_held - held @ held)
+            if block_t(lost) < SIGMAS or float(lost.sum()) < 0.01 * total:
+                notes.append(
+                    f"{dropped.candidate.name} was dropped: the effects found after it explain the same"
+                )
+                accepted, current, held = kept, fit, validate
+                break
+        else:
+            break
+    return accepted, current, held, notes
+
+
+def _rivals(bench: Bench, first: Round, base: Fit, held: FloatArray) -> tuple[Scored, ...]:
+    """Other effects than the first accepted one that explain the held-out recordings as well, within the uncertainty."""
+    winner = first.accepted
+    if winner is None:
+        return ()
+    rivals: dict[str, Scored] = {}
+    for other in first.scored:
+        name = other.candidate.effect.name
+        if name == winner.candidate.effect.name or name in rivals:
+            continue
+        if other.held_out_gain < 0.9 * winner.held_out_gain:
+            continue
+        polished = _polish(bench, other, base, held)
+        lead = block_gains(bench.of("validate"), polished.validate, winner.validate)
+        if block_t(lead) < SIGMAS or float(lead.sum()) < TIE_SHARE * winner.held_out_gain:
+            rivals[name] = polished
+    return tuple(rivals.values())

@@ -1,0 +1,21 @@
+"""Clearance between screw and nut."""
+
+from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+
+EFFECT = Effect(
+    name="backlash",
+    title="Clearance between screw and nut",
+    physics="F_s = 0 within +- gap/2, contact beyond",
+    source="Nordin and Gutman, Automatica 38 (2002) 1633",
+    signature="position lags by the gap after each reversal of the force, velocity spikes when the flanks meet",
+    variants=(
+        Variant(
+            interface="ContactEffect",
+            block="Backlash",
+            parameters=(
+                EffectParameter("gap", "m", 2e-05, "clearance, flank to flank", lower=0.0, upper=0.05),
+            ),
+        ),
+    ),
+    injection="output",
+)

@@ -1,0 +1,34 @@
+"""Cogging torque of the motor."""
+
+from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+
+EFFECT = Effect(
+    name="cogging",
+    title="Cogging torque of the motor",
+    physics="tau = a sin(n phi + phase), without current",
+    source="Hendershot and Miller, Design of Brushless Permanent-Magnet Machines (2010)",
+    signature="ripple of speed and current at a multiple of the rotor's angle, at every load",
+    variants=(
+        Variant(
+            interface="FrictionEffect",
+            block="Cogging",
+            parameters=(
+                EffectParameter("a_s", "F", 0.01, "amplitude, sine part"),
+                EffectParameter("a_c", "F", 0.01, "amplitude, cosine part"),
+                EffectParameter(
+                    "n",
+                    "1",
+                    1.0,
+                    "periods per revolution",
+                    role="shape",
+                    lower=0.5,
+                    upper=100.0,
+                    starts=(4.0, 6.0, 8.0, 12.0, 24.0, 36.0, 48.0),
+                    scanned=True,
+                ),
+            ),
+            slots=("motor",),
+        ),
+    ),
+    injection="load",
+)

@@ -1,0 +1,32 @@
+"""Friction that falls as the lubricant is worked in."""
+
+from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+
+EFFECT = Effect(
+    name="friction-run-in",
+    title="Friction that falls as the lubricant is worked in",
+    physics="F = dF exp(-d/d_r) sgn(v), d the distance travelled",
+    source="Olofsson et al., Wear 270 (2011): grease at low temperature; Blau, Tribology International 38 (2005) 1007",
+    signature="friction in the current that decays over the run, whatever the position",
+    variants=(
+        Variant(
+            interface="FrictionEffect",
+            block="FrictionRunIn",
+            parameters=(
+                EffectParameter("dF", "F", 0.02, "friction at the start above the end", lower=0.0),
+                EffectParameter(
+                    "d_r",
+                    "D",
+                    0.3,
+                    "distance of the decay",
+                    role="shape",
+                    lower=0.01,
+                    upper=10.0,
+                    starts=(0.1, 0.5),
+                ),
+            ),
+            slots=("screw", "motor", "guide"),
+        ),
+    ),
+    injection="load",
+)

@@ -1,0 +1,73 @@
+"""Ripple of the screw with its angle."""
+
+from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+
+EFFECT = Effect(
+    name="screw-ripple",
+    title="Ripple of the screw with its angle",
+    physics="torque or friction a sin(n phi_g + phase), or a lead error of the same form",
+    source="Mei, Tsutsumi, Tao, Sun, Mechanism and Machine Theory 38 (2003); ISO 3408-3 (lead deviation)",
+    signature="periodic in the screw's angle: in the current (torque, friction) or in position against motor angle (lead)",
+    variants=(
+        Variant(
+            interface="FrictionEffect",
+            block="Ripple",
+            parameters=(
+                EffectParameter("a_s", "F", 0.01, "amplitude, sine part"),
+                EffectParameter("a_c", "F", 0.01, "amplitude, cosine part"),
+                EffectParameter(
+                    "n",
+                    "W",
+                    1.0,
+                    "periods per revolution",
+                    role="shape",
+                    lower=0.1,
+                    upper=1000.0,
+                    starts=(1.0, 2.0),
+                    scanned=True,
+                ),
+            ),
+            slots=("gearbox", "guide"),
+        ),
+        Variant(
+            interface="FrictionEffect",
+            block="RippleFriction",
+            parameters=(
+                EffectParameter("a_s", "F", 0.01, "amplitude, sine part"),
+                EffectParameter("a_c", "F", 0.01, "amplitude, cosine part"),
+                EffectParameter(
+                    "n",
+                    "W",
+                    1.0,
+                    "periods per revolution",
+                    role="shape",
+                    lower=0.1,
+                    upper=1000.0,
+                    starts=(1.0, 2.0),
+                    scanned=True,
+                ),
+            ),
+            slots=("gearbox", "guide"),
+        ),
+        Variant(
+            interface="ContactEffect",
+            block="LeadError",
+            parameters=(
+                EffectParameter("a_s", "m", 2e-06, "amplitude, sine part"),
+                EffectParameter("a_c", "m", 2e-06, "amplitude, cosine part"),
+                EffectParameter(
+                    "n",
+                    "W",
+                    1.0,
+                    "periods per revolution",
+                    role="shape",
+                    lower=0.1,
+                    upper=1000.0,
+                    starts=(1.0, 2.0),
+                    scanned=True,
+                ),
+            ),
+        ),
+    ),
+    injection="load",
+)

@@ -1,0 +1,20 @@
+"""Drag with the square of the motor's speed."""
+
+from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+
+EFFECT = Effect(
+    name="windage",
+    title="Drag with the square of the motor's speed",
+    physics="tau = b_q w^2 sgn(w)",
+    source="equation 5 of the article (b_q); Vrancik, NASA TN D-4849 (1968)",
+    signature="current at high speed beyond the viscous part",
+    variants=(
+        Variant(
+            interface="FrictionEffect",
+            block="Windage",
+            parameters=(EffectParameter("b_q", "F/V^2", 0.02, "quadratic coefficient", lower=0.0),),
+            slots=("motor", "guide"),
+        ),
+    ),
+    injection="load",
+)

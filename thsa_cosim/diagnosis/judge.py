@@ -1,0 +1,120 @@
+"""An attribution in the words of the result."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from thsa_cosim.diagnosis.attribution import Attribution, Round, Scored
+from thsa_cosim.diagnosis.fit import Fit
+from thsa_cosim.diagnosis.results import FoundEffect, Judged, Value
+from thsa_cosim.diagnosis.screen import Proposal
+
+
+def values_of(fit: Fit, *, declared: bool, inflation: float = 1.0) -> dict[str, Value]:
+    """The declared parameters (or the others) of a fit with standard errors."""
+    stderr = fit.stderr(inflation)
+    return {
+        u.name: Value(float(x), u.unit, float(s))
+        for u, x, s in zip(fit.unknowns.members, fit.vector, stderr, strict=True)
+        if u.declared is declared
+    }
+
+
+def found_effects(found: Attribution, fit: Fit, inflation: float) -> tuple[FoundEffect, ...]:
+    """The accepted effects with the values of the extended model; variants of one effect in one place are one."""
+    merged: dict[str, list[Scored]] = {}
+    for scored in found.accepted:
+        merged.setdefault(scored.candidate.name, []).append(scored)
+    values = values_of(fit, declared=False, inflation=inflation)
+    rivals = tuple(r.candidate.name for r in found.rivals)
+    effects = []
+    for number, (name, members) in enumerate(merged.items()):
+        owner = found.rounds[0] if number == 0 else _round_of(found, members[0])
+        chance = owner.probability(members[0].fit_gain)
+        effects.append(
+            FoundEffect(
+                name=name,
+                title=members[0].candidate.effect.title,
+                parameters={
+                    p.name: values[p.variable]
+                    for s in members
+                    for p in s.candidate.parameters
+                    if p.variable in values
+                },
+                equivalent=rivals if number == 0 else (),
+                probability=(1.0 - chance) / (1 + len(rivals) if number == 0 else 1),
+            )
+        )
+    return tuple(effects)
+
+
+def _round_of(found: Attribution, scored: Scored) -> Round:
+    return next(r for r in found.rounds if r.accepted is not None and r.accepted.proposal is scored.proposal)
+
+
+def judged(found: Attribution) -> tuple[Judged, ...]:
+    """Every candidate's best proposal in each round, most telling first."""
+    made: list[Judged] = []
+    rivals = {r.candidate.key for r in found.rivals}
+    for number, one in enumerate(found.rounds, start=1):
+        refined = {id(s.proposal): s for s in one.scored}
+        seen: set[str] = set()
+        ordered = sorted(one.proposals, key=lambda p: (id(p) not in refined, -p.gain))
+        for proposal in ordered:
+            key = proposal.candidate.key
+            if key in seen:
+                continue
+            seen.add(key)
+            made.append(_judge(one, number, proposal, refined.get(id(proposal)), rivals))
+    return tuple(made)
+
+
+def _judge(one: Round, number: int, proposal: Proposal, scored: Scored | None, rivals: set[str]) -> Judged:
+    candidate = proposal.candidate
+    winner = one.accepted
+    accepted = winner is not None and winner.proposal is proposal
+    values = _values(proposal, scored)
+    gain = proposal.gain if scored is None else scored.fit_gain
+    decision, reason = "not refined", "promises no more than chance"
+    if proposal.gain >= one.threshold:
+        reason = "promises less than those that were refined"
+    if _not_testable(proposal, one.threshold):
+        decision, reason = "not testable", "too little excitation beside the declared parameters"
+    if scored is not None:
+        decision = (
+            "accepted" if accepted else "rival" if number == 1 and candidate.key in rivals else "rejected"
+        )
+        reason = ""
+        if decision == "rejected":
+            reason = one.reason if winner is None else "explains the held-out recordings less well"
+        elif decision == "rival":
+            reason = "explains the held-out recordings as well, within the uncertainty"
+    return Judged(
+        name=candidate.name,
+        variant=proposal.label,
+        fit_gain=gain,
+        held_out_gain=None if scored is None else scored.held_out_gain,
+        p_value=one.probability(gain),
+        parameters=values,
+        decision=decision,  # type: ignore[arg-type]
+        reason=reason,
+        round=number,
+    )
+
+
+def _values(proposal: Proposal, scored: Scored | None) -> Mapping[str, Value]:
+    if scored is not None:
+        found = values_of(scored.fit, declared=False)
+        return {p.name: found[p.variable] for p in proposal.candidate.parameters if p.variable in found}
+    spread = np.sqrt(np.diag(np.linalg.pinv(proposal.precision, hermitian=True)))
+    return {
+        p.name: Value(p.neutral + float(a), p.unit, float(s))
+        for p, a, s in zip(proposal.candidate.coefficients, proposal.amplitudes, spread, strict=True)
+    }
+
+
+def _not_testable(proposal: Proposal, threshold: float) -> bool:
+    """Whether even a coefficient ten times as large as usual would drown in chance."""
+    spread = np.sqrt(np.diag(np.linalg.pinv(proposal.precision, hermitian=True)))
+    typical = np.array([p.typical for p in proposal.candidate.coefficients])
+    return bool(np.all(np.sqrt(threshold) * spread > 10.0 * np.abs(typical)))

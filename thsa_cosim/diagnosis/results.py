@@ -1,0 +1,129 @@
+"""What a diagnosis found, as frozen data."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from thsa_cosim.diagnosis.structure import ChannelError
+from thsa_cosim.signals import Signals
+
+Verdict = Literal["missing-effect", "no-missing-effect", "unexplained-structure"]
+
+
+@dataclass(frozen=True)
+class Value:
+    """A fitted number in its unit, with one standard error."""
+
+    value: float
+    unit: str
+    stderr: float
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect that was added: its parameters, what these recordings cannot tell it from, and how sure it is."""
+
+    name: str
+    title: str
+    parameters: Mapping[str, Value]
+    equivalent: tuple[str, ...]
+    probability: float
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A candidate that was looked at: ``held_out_gain`` in variances of the noise, ``decision`` and its ``reason``."""
+
+    name: str
+    variant: str
+    fit_gain: float
+    held_out_gain: float | None
+    p_value: float
+    parameters: Mapping[str, Value]
+    decision: Literal["accepted", "rival", "rejected", "not refined", "not testable"]
+    reason: str
+    round: int
+
+
+@dataclass(frozen=True)
+class Balance:
+    """An equation between measured signals: its residual and what the sensors' noise makes of it, in ``unit``."""
+
+    equation: str
+    unit: str
+    rmse: float
+    noise: float
+    share: float
+    at_fault: bool
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """Mean residual of a channel in a bin of a variable, before and after, in the channel's unit."""
+
+    variable: str
+    bin_centre: float
+    unit: str
+    channel: str
+    channel_unit: str
+    mean_before: float
+    mean_after: float
+    stderr: float
+
+
+@dataclass(frozen=True)
+class SeparatingExperiment:
+    """The experiment that tells rivals apart best: ``inputs`` over time, ``distance`` in variances of the noise."""
+
+    name: str
+    rivals: tuple[str, str]
+    distance: float
+    present: float
+    inputs: Signals
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A recording beside both models' outputs."""
+
+    name: str
+    part: Literal["fit", "validate"]
+    measured: Signals
+    before: Signals | None
+    after: Signals | None
+
+
+Errors = Mapping[str, Mapping[str, ChannelError]]
+"""Part ("fit", "validate") → channel → error."""
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosisResult:
+    """The verdict and all that led to it."""
+
+    title: str
+    status: Literal["complete", "interrupted"]
+    seed: int
+    version: str
+    scenario: Path
+    fmu: Path
+    fmu_sha256: str
+    verdict: Verdict
+    effects: tuple[FoundEffect, ...]
+    before: Errors
+    after: Errors
+    declared_before: Mapping[str, Value]
+    declared_after: Mapping[str, Value]
+    unexplained: float
+    model: Path | None
+    extended_fmu: Path | None
+    judged: tuple[Judged, ...]
+    balances: tuple[Balance, ...]
+    dependence: tuple[Dependence, ...]
+    experiment: SeparatingExperiment | None
+    comparisons: tuple[Comparison, ...]
+    threshold: float
+    evaluations: int
+    failures: Mapping[str, int]
+    notes: tuple[str, ...]

@@ -1,0 +1,196 @@
+"""The use case: scenario → superset → attribution → closure → verdict."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from thsa_cosim import __version__
+from thsa_cosim.diagnosis.attribution import Attribution, Scored, attribute
+from thsa_cosim.diagnosis.balance import close_balances
+from thsa_cosim.diagnosis.bench import Bench, Trial
+from thsa_cosim.diagnosis.candidate import candidates_of
+from thsa_cosim.diagnosis.catalogue import catalogue, choose
+from thsa_cosim.diagnosis.closure import (
+    Identified,
+    extended_unknowns,
+    identify_from_drawing,
+    write_extended_model,
+)
+from thsa_cosim.diagnosis.dependence import dependence
+from thsa_cosim.diagnosis.judge import found_effects, judged, values_of
+from thsa_cosim.diagnosis.problem import declared_unknowns, spec_of, trials_of, with_fmu
+from thsa_cosim.diagnosis.results import Comparison, DiagnosisResult, Verdict
+from thsa_cosim.diagnosis.scanning import scanner
+from thsa_cosim.diagnosis.structure import ChannelError, errors, structure
+from thsa_cosim.diagnosis.superset import build_superset, scales_of
+from thsa_cosim.diagnosis.unknowns import Unknowns
+from thsa_cosim.errors import StudyError
+from thsa_cosim.identify import open_study, study_identity
+from thsa_cosim.identify.study import describe
+from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
+
+#: More than this share of the structure left after all effects: something else is missing.
+UNEXPLAINED_SHARE = 0.15
+#: Structure (rms in standard deviations of the noise, in some channel) and its significance that count as such.
+VISIBLE, SIGNIFICANT = 0.15, 6.0
+#: The folder of the superset inside a study.
+WORK = "superset"
+
+Say = Callable[[str], None]
+
+
+def diagnose(
+    scenario: Scenario,
+    *,
+    folder: Path,
+    workers: int = 1,
+    cluster: str | None = None,
+    on_progress: Say | None = None,
+    command: str = "",
+) -> DiagnosisResult:
+    """Find what the scenario's model lacks, add it, and report held-out errors before and after.
+
+    Raises
+    ------
+    InputError
+        If the scenario is no diagnosis, the model has no effect slots, or the folder holds another study.
+    MissingExtraError
+        If exporting (``thsa-cosim[export]``) is not installed.
+    StudyError
+        If the declared model cannot be simulated.
+    """
+    spec = spec_of(scenario)
+    say = on_progress or (lambda _: None)
+    trials = trials_of(scenario)
+    unknowns = declared_unknowns(scenario, trials)
+    effects = choose(catalogue(spec.catalogue), spec.effects, f"{scenario.path}: diagnose.effects")
+    open_study(folder, study_identity(scenario), describe(scenario, command))
+    if spec.model is None:
+        raise StudyError(f"{scenario.path}: diagnose.model is missing.")
+    say("exporting the superset of all effects")
+    fmu, slots, chosen = build_superset(spec.model, spec.package, effects.values(), folder / WORK)
+    own = with_fmu(trials, fmu)
+    fit_cases = [t.case for t in own if t.part == "fit"]
+    scales = scales_of(fmu, slots, fit_cases, scenario.simulation)
+    candidates = candidates_of(chosen, slots, scales)
+    with open_runner(scenario.simulation, [t.experiment for t in own], workers, cluster) as runner:
+        bench = Bench(runner, own)
+        scan = scanner(bench, fmu, slots, scenario.simulation)
+        found = attribute(bench, unknowns, candidates, scan, seed=scenario.seed, most=spec.most, say=say)
+    if found is None:
+        reason = next(iter(bench.failures), "no run succeeded")
+        raise StudyError(f"{scenario.path}: the declared model cannot be simulated: {reason}")
+    return _Closing(scenario, spec, folder, workers, cluster, trials, unknowns, found, bench, say).result()
+
+
+@dataclass(frozen=True, eq=False)
+class _Closing:
+    """From an attribution to the result."""
+
+    scenario: Scenario
+    spec: DiagnoseSpec
+    folder: Path
+    workers: int
+    cluster: str | None
+    trials: tuple[Trial, ...]
+    unknowns: Unknowns
+    found: Attribution
+    bench: Bench
+    say: Say
+
+    def result(self) -> DiagnosisResult:
+        """Identify both models on their own FMUs and judge them."""
+        scenario, found = self.scenario, self.found
+        self.say("identifying the declared model from the drawing")
+        before = self._identify(scenario.fmu.path, self.unknowns, [found.base.vector])
+        accepted, notes, after = found.accepted, list(found.notes), before
+        model: Path | None = None
+        extended: Path | None = None
+        if accepted:
+            self.say(f"exporting the model with {', '.join(s.candidate.name for s in accepted)}")
+            assert self.spec.model is not None
+            model, extended = write_extended_model(
+                self.folder, self.spec.model, self.spec.package, accepted, found.final
+            )
+            self.say("identifying the extended model from the drawing")
+            wider = extended_unknowns(self.unknowns, accepted)
+            hint = np.array([found.final.vector[found.final.unknowns.names.index(n)] for n in wider.names])
+            after = self._identify(extended, wider, [hint])
+        share, verdict = self._verdict(before, after, accepted)
+        counts = dict(self.bench.failures)
+        for identified in (before, after) if accepted else (before,):
+            for reason, count in identified.failures.items():
+                counts[reason] = counts.get(reason, 0) + count
+        inflation = max(1.0, after.fit.misfit / after.fit.residual.size)
+        return DiagnosisResult(
+            title=scenario.title or scenario.path.stem,
+            status="complete",
+            seed=scenario.seed,
+            version=__version__,
+            scenario=scenario.path,
+            fmu=scenario.fmu.path,
+            fmu_sha256=scenario.fmu.sha256,
+            verdict=verdict,
+            effects=found_effects(found, after.fit, inflation),
+            before=_errors(before),
+            after=_errors(after) if accepted else {"fit": {}, "validate": {}},
+            declared_before=values_of(before.fit, declared=True),
+            declared_after=values_of(after.fit, declared=True, inflation=inflation),
+            unexplained=share,
+            model=model,
+            extended_fmu=extended,
+            judged=judged(found),
+            balances=close_balances(scenario, self.spec),
+            dependence=dependence(scenario, self.trials, before, after),
+            experiment=None,
+            comparisons=_comparisons(before, after if accepted else None),
+            threshold=found.rounds[0].threshold if found.rounds else 0.0,
+            evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if accepted else 0),
+            failures=counts,
+            notes=tuple(notes),
+        )
+
+    def _identify(self, fmu: Path, unknowns: Unknowns, hints: Sequence[np.ndarray]) -> Identified:
+        return identify_from_drawing(
+            fmu, self.trials, unknowns, hints, self.scenario.simulation, self.workers, self.cluster
+        )
+
+    def _verdict(
+        self, before: Identified, after: Identified, accepted: Sequence[Scored]
+    ) -> tuple[float, Verdict]:
+        """Share of the held-out structure that is left, and the verdict."""
+        held_out = tuple(t for t in self.trials if t.part == "validate")
+        first, last = structure(held_out, before.validate), structure(held_out, after.validate)
+        visible = is_visible(errors(held_out, after.validate))
+        share = float(np.clip(last / first, 0.0, 1.0)) if first > 0.0 and visible else 0.0
+        if accepted and not (visible and share > UNEXPLAINED_SHARE):
+            return share, "missing-effect"
+        return share, "unexplained-structure" if visible else "no-missing-effect"
+
+
+def is_visible(found: Mapping[str, ChannelError]) -> bool:
+    """Whether some channel holds structure that is neither chance nor too small to matter."""
+    return any(e.structure > VISIBLE * e.noise and e.significance > SIGNIFICANT for e in found.values())
+
+
+def _errors(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
+    parts = {"fit": identified.fit.residual, "validate": identified.validate}
+    return {
+        part: errors(tuple(t for t in identified.trials if t.part == part), residual)
+        for part, residual in parts.items()
+    }
+
+
+def _comparisons(before: Identified, after: Identified | None) -> tuple[Comparison, ...]:
+    return tuple(
+        Comparison(
+            t.case.name,
+            t.part,
+            t.case.measured,
+            before.signals.get(t.name),
+            None if after is None else after.signals.get(t.name),
+        )
+        for t in before.trials
+    )

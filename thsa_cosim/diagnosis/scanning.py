@@ -1,0 +1,52 @@
+"""Starts for wave numbers: what the residual repeats over, slot by slot."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from thsa_cosim.diagnosis.bench import Bench
+from thsa_cosim.diagnosis.fit import Fit
+from thsa_cosim.diagnosis.scan import wave_numbers
+from thsa_cosim.diagnosis.slots import Slot
+from thsa_cosim.diagnosis.superset import slot_signals
+from thsa_cosim.scenario import SimulationSpec
+
+#: Periods per revolution that are looked at on a shaft; along a path: periods per largest excursion.
+_HARMONICS = np.arange(1.0, 61.0)
+_PERIODS = np.arange(4.0, 200.0, 0.25)
+
+
+def scanner(
+    bench: Bench, fmu: Path, slots: Sequence[Slot], simulation: SimulationSpec
+) -> Callable[[Fit], Mapping[str, Sequence[float]]]:
+    """Return a function: fit → per friction slot the wave numbers at which its residuals repeat."""
+    chosen = [slot for slot in slots if slot.interface == "FrictionEffect"]
+    trials = bench.of("fit")
+
+    def scan(fit: Fit) -> Mapping[str, Sequence[float]]:
+        values = {t.case.name: fit.unknowns.assignments(fit.vector, t.group) for t in trials}
+        signals = slot_signals(fmu, chosen, [t.case for t in trials], values, simulation)
+        residuals: list[list[np.ndarray]] = []
+        place = 0
+        for t in trials:
+            residuals.append([])
+            for channel in t.case.channels:
+                residuals[-1].append(fit.residual[place : place + channel.measured.size])
+                place += channel.measured.size
+        found: dict[str, Sequence[float]] = {}
+        for slot in chosen:
+            positions, own = [], []
+            for t, parts in zip(trials, residuals, strict=True):
+                run = signals.get(t.case.name)
+                if run is not None:
+                    times = t.case.channels[0].time
+                    positions.append(np.interp(times, run.time, run[f"{slot.component}.z"]))
+                    own.append([p for p in parts if p.size == times.size])
+            angular = slot.units.get("z") == "rad"
+            reach = max((float(np.max(np.abs(z))) for z in positions), default=1.0) or 1.0
+            grid = _HARMONICS if angular else 2.0 * np.pi * _PERIODS / reach
+            found[slot.name] = wave_numbers(positions, own, grid)
+        return found
+
+    return scan

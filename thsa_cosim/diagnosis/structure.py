@@ -1,0 +1,102 @@
+"""What is left in a residual beside white noise, and how sure that is.
+
+The product of neighbouring samples has the mean 0 for white noise whatever its size, and that of the squared structure
+for anything that is smooth over a sample: unlike the root mean square it does not need the noise to be known.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from thsa_cosim.diagnosis.bench import Trial
+from thsa_cosim.signals import FloatArray
+
+
+@dataclass(frozen=True)
+class ChannelError:
+    """A channel's error over some recordings, in its unit: ``rmse``, ``noise`` and the ``structure`` in it (rms).
+
+    ``significance``: the structure's square in standard deviations of what white noise would show.
+    """
+
+    rmse: float
+    noise: float
+    structure: float
+    significance: float
+    samples: int
+
+
+def split(trials: Sequence[Trial], residual: FloatArray) -> dict[str, list[FloatArray]]:
+    """Stacked residuals (N,) → per channel one array per recording, in standard deviations."""
+    parts: dict[str, list[FloatArray]] = {}
+    position = 0
+    for trial in trials:
+        for channel in trial.case.channels:
+            parts.setdefault(channel.name, []).append(residual[position : position + channel.measured.size])
+            position += channel.measured.size
+    return parts
+
+
+def lagged(parts: Sequence[FloatArray]) -> tuple[float, float]:
+    """Mean product of neighbours and its standard deviation for white noise of the same size."""
+    products = np.concatenate([part[1:] * part[:-1] for part in parts])
+    power = float(np.mean(np.concatenate(parts) ** 2))
+    return float(products.mean()), min(power, 1.5) / np.sqrt(products.size)
+
+
+def structure(trials: Sequence[Trial], residual: FloatArray) -> float:
+    """Sum over channels and samples of the squared structure, in variances of the noise; may be negative."""
+    return float(
+        sum(lagged(parts)[0] * sum(p.size for p in parts) for parts in split(trials, residual).values())
+    )
+
+
+def errors(trials: Sequence[Trial], residual: FloatArray) -> Mapping[str, ChannelError]:
+    """Per channel the error over the recordings."""
+    noises = {c.name: [] for t in trials for c in t.case.channels}  # type: dict[str, list[float]]
+    for trial in trials:
+        for channel in trial.case.channels:
+            noises[channel.name].append(channel.noise / np.sqrt(channel.weight))
+    found = {}
+    for name, parts in split(trials, residual).items():
+        noise = float(np.sqrt(np.mean(np.square(noises[name]))))
+        mean, deviation = lagged(parts)
+        joined = np.concatenate(parts)
+        found[name] = ChannelError(
+            rmse=float(np.sqrt(np.mean(joined**2))) * noise,
+            noise=noise,
+            structure=float(np.sqrt(max(mean, 0.0))) * noise,
+            significance=mean / deviation,
+            samples=joined.size,
+        )
+    return found
+
+
+def block_gains(
+    trials: Sequence[Trial], worse: FloatArray, better: FloatArray, seconds: float = 0.5
+) -> FloatArray:
+    """Decrease of the squared residuals per block of time (b,), all channels together.
+
+    Blocks are long against the correlation of the residuals, so that their scatter says what chance does.
+    """
+    sums: list[FloatArray] = []
+    position = 0
+    for trial in trials:
+        per_trial = []
+        for channel in trial.case.channels:
+            stop = position + channel.measured.size
+            gain = worse[position:stop] ** 2 - better[position:stop] ** 2
+            block = np.floor((channel.time - channel.time[0]) / seconds).astype(int)
+            per_trial.append(np.bincount(block, weights=gain))
+            position = stop
+        longest = max(p.size for p in per_trial)
+        sums.append(np.sum([np.pad(p, (0, longest - p.size)) for p in per_trial], axis=0))
+    return np.concatenate(sums)
+
+
+def block_t(gains: FloatArray) -> float:
+    """Mean of block gains over its standard error."""
+    if gains.size < 2:
+        return 0.0
+    return float(gains.mean() / max(gains.std(ddof=1) / np.sqrt(gains.size), 1e-12))

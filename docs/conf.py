@@ -9,7 +9,14 @@ project = "thsa-cosim"
 author = "The thsa-cosim developers"
 copyright = "2026, the thsa-cosim developers"
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "index_of_readme", "mathml"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "docstrings",
+    "index_of_readme",
+    "mathml",
+]
 root_doc = "README"
 html_theme = "furo"
 html_title = "thsa-cosim"

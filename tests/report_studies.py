@@ -253,43 +253,44 @@ def write_tune(folder: Path) -> dict[str, Any]:
 def diagnose_result() -> dict[str, Any]:
     """A backlash was found; stribeck was weighed and refused, and the heating of the winding cannot be tested."""
     gap = {"value": 2.5e-4, "unit": "m", "stderr": 1e-5}
-    before, after = {"v": {"rmse": 1e-4, "noise": 2e-5}}, {"v": {"rmse": 2.1e-5, "noise": 2e-5}}
+    before = {"v": {"rmse": 1e-4, "noise": 2e-5, "structure": 9.8e-5}}
+    after = {"v": {"rmse": 2.1e-5, "noise": 2e-5, "structure": 1e-6}}
+    weighed = {"round": 1, "fit_gain": 5e4, "p_value": 1e-9, "parameters": {"gap": gap}}
     return {
         "kind": "diagnose",
         "title": "unit 7",
         "status": "complete",
-        "seed": 7,
-        "evaluations": 300,
-        "failures": {},
-        "fmu": {"path": "THSA.fmu", "sha256": "a" * 64},
-        "scenario": "driven.toml",
-        "version": "0.1.0",
         "verdict": "missing-effect",
         "effects": [
-            {
-                "name": "backlash",
-                "parameters": {"gap": gap},
-                "equivalent": ["velocity-sensor-delay"],
-                "probability": 0.99,
-            }
+            {"name": "backlash", "title": "Backlash of the screw", "parameters": {"gap": gap}}
+            | {"equivalent": ["velocity-sensor-delay"], "probability": 0.99}
         ],
         "before": {"fit": before, "validate": before},
         "after": {"fit": after, "validate": after},
         "unexplained": 0.02,
         "model": "THSA_with_backlash.mo",
+        "extended_fmu": "THSA_with_backlash.fmu",
+        "parameters": {
+            "before": {"J": {"value": 2.1e-3, "unit": "kg.m2", "stderr": 1e-5}},
+            "after": {"J": {"value": 2.0e-3, "unit": "kg.m2", "stderr": 1e-5}},
+        },
+        "threshold": 30.0,
         "candidates": [
+            {"name": "backlash", "variant": "backlash:screw", "held_out_gain": 4e4, **weighed}
+            | {"decision": "accepted", "reason": ""},
+            {"name": "stribeck", "variant": "stribeck:screw", "held_out_gain": 12.0, **weighed}
+            | {"decision": "rejected", "reason": "explains the held-out recordings less well"},
+            {"name": "windage", "variant": "windage", "held_out_gain": None, **weighed}
+            | {"decision": "not refined", "reason": "promises no more than chance"},
             {
-                "name": "backlash",
-                "variant": "screw",
-                "held_out_gain": 0.79,
-                "p_value": 1e-9,
-                "parameters": {"gap": gap},
+                "name": "winding-self-heating",
+                "variant": "winding-self-heating",
+                "held_out_gain": None,
+                **weighed,
             }
-            | {"decision": "accepted", "reason": "the held-out error falls"},
-            {"name": "stribeck", "variant": "screw", "held_out_gain": 0.001, "p_value": 0.4, "parameters": {}}
-            | {"decision": "refused", "reason": "no better than declared parameters tuned again"},
+            | {"decision": "not testable", "reason": "too little excitation"},
         ],
-        "not_testable": [{"name": "winding-self-heating", "reason": "the recordings are shorter than 60 s"}],
+        "not_testable": [{"name": "winding-self-heating", "reason": "too little excitation"}],
         "balance": [
             {
                 "equation": "screw contact",
@@ -302,10 +303,19 @@ def diagnose_result() -> dict[str, Any]:
             {"equation": "winding", "unit": "V", "rmse": 0.31, "noise": 0.3, "share": 0.1, "at_fault": False},
         ],
         "experiment": {
-            "between": ["backlash", "velocity-sensor-delay"],
-            "record": "slow reversals under no load",
+            "name": "slow reversals under no load",
+            "rivals": ["backlash", "velocity-sensor-delay"],
+            "distance": 812.0,
+            "present": 3.5,
+            "file": "experiment.csv",
         },
         "notes": [],
+        "seed": 7,
+        "evaluations": 300,
+        "failures": {},
+        "fmu": {"path": "THSA.fmu", "sha256": "a" * 64},
+        "scenario": "driven.toml",
+        "version": "0.1.0",
     }
 
 
@@ -323,8 +333,10 @@ def write_diagnose(folder: Path) -> dict[str, Any]:
         write_signals(
             folder, role, name, {k: Signals(time, {"v": v}, {"v": "m/s"}) for k, v in values.items()}
         )
-    lines = ["variable,bin_centre,unit,channel,mean_before,mean_after,stderr"]
-    for variable, unit in (("v", "m/s"), ("F_load", "N")):
-        lines += [f"{variable},{k / 10},{unit},v,{1e-4 * (k % 2)},{1e-6},{1e-6}" for k in range(-5, 6)]
+    lines = ["variable,bin_centre,unit,channel,channel_unit,mean_before,mean_after,stderr"]
+    variables = {"time": "s", "v_cmd": "m/s", "F_load": "N", "x": "m", "w_m": "rad/s", "i_q": "A", "u_q": "V"}
+    for k, (variable, unit) in enumerate(variables.items()):
+        # The later a variable, the more clearly the residual depends on it.
+        lines += [f"{variable},{x / 10},{unit},v,m/s,{1e-5 * k * np.sign(x)},0.0,1e-6" for x in range(-5, 6)]
     (folder / "structure.csv").write_text("\n".join(lines) + "\n")
     return result

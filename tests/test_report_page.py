@@ -161,19 +161,30 @@ def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(
     page = show(write_page(tmp_path))
     summary = page.inner_text("#summary")
     assert "The model lacks backlash: added to it, the error on held-out recordings falls." in summary
+    assert "backlash (Backlash of the screw)" in summary
     assert "(2.50 ± 0.10)e-4" in summary
     assert "These recordings cannot tell backlash from velocity-sensor-delay." in summary
-    assert "slow reversals under no load" in summary
+    assert (
+        "Record slow reversals under no load (experiment.csv): it sets backlash and velocity-sensor-delay 812"
+        in summary
+    )
     assert "2 % of the repeatable residual is left unexplained." in summary
-    assert cells(table_of(page, "Errors before and after"), "after / noise") == ["1.05", "1.05"]
-    assert cells(table_of(page, "Errors before and after"), "unit") == ["m/s", "m/s"]
+    errors = table_of(page, "Errors before and after")
+    assert cells(errors, "after / noise") == ["1.05", "1.05"]
+    assert cells(errors, "unit") == ["m/s", "m/s"]
     assert cells(table_of(page, "The residual by balance equation"), "at fault") == ["yes", "no"]
-    assert cells(table_of(page, "Effects that were weighed"), "decision") == ["accepted", "refused"]
-    assert "shorter than 60 s" in page.inner_text("#candidates")
     found = plots(page)
-    assert set(found) == {"balance", "ratios", "dependence", "signals-0", "signals-1"}
+    scored = table_of(page, "Effects that were fitted and scored on held-out recordings")
+    assert cells(scored, "decision") == ["accepted", "rejected"]
+    assert cells(table_of(page, "Effects that promised too little to be fitted"), "effect") == ["windage"]
+    assert cells(table_of(page, "Effects that these recordings cannot test"), "effect") == [
+        "winding-self-heating"
+    ]
+    assert set(found) == {"balance", "ratios", "dependence", "dependence-0", "signals-0", "signals-1"}
     assert len(found["balance"].query_selector_all(".barlayer .point path")) == 2
-    assert axis_titles(found["dependence"]) == ["v [m/s]", "F_load [N]", "v [m/s]", "v [m/s]"]
+    # The clearest six of the seven come first.
+    clearest = [title for title in axis_titles(found["dependence"]) if title != "v [m/s]"]
+    assert clearest == ["u_q [V]", "i_q [A]", "w_m [rad/s]", "x [m]", "F_load [N]", "v_cmd [m/s]"]
     names = found["signals-0"].evaluate("p => p._fullData.map(t => t.name)")
     assert names == ["measured", "before", "after", "residual before", "residual after"]
     assert page.troubles == []

@@ -2,10 +2,11 @@
 
 from thsa_cosim.report.page.chart import AFTER, BEFORE, Chart
 from thsa_cosim.report.page.comparison import noise_ratio, ratio_mark, recording_folds, role_text
-from thsa_cosim.report.page.content import Block, Cell, Column, Facts, Figure, Section, Table, Text
+from thsa_cosim.report.page.content import Block, Cell, Column, Facts, Figure, Fold, Section, Table, Text
 from thsa_cosim.report.page.folder import Json, Part
 from thsa_cosim.report.page.text import (
     DASH,
+    count,
     listing,
     number_cell,
     percent,
@@ -14,6 +15,7 @@ from thsa_cosim.report.page.text import (
     text_cell,
 )
 from thsa_cosim.report.signal_files import read_signals, signal_paths, signal_units
+from thsa_cosim.report.tables import number
 
 _VERDICTS = {
     "missing-effect": "The model lacks {effects}: added to it, the error on held-out recordings falls.",
@@ -25,7 +27,7 @@ _VERDICTS = {
 
 
 def verdict(result: Json) -> tuple[Block, ...]:
-    """What the summary says first: the verdict, and each effect with its parameters."""
+    """What the summary says first: the verdict, each effect with its parameters, and what would tell rivals apart."""
     word = str(result["verdict"])
     effects: list[Json] = result.get("effects", [])
     names = listing([e["name"] for e in effects])
@@ -35,48 +37,79 @@ def verdict(result: Json) -> tuple[Block, ...]:
     blocks: list[Block] = [Text(sentence, "good" if word == "no-missing-effect" else "bad")]
     if effects:
         blocks.append(_effects_table(effects))
-    left = result.get("unexplained")
-    if left is not None:
-        blocks.append(Text(f"{percent(left)} of the repeatable residual is left unexplained."))
+    facts = []
+    if result.get("unexplained") is not None:
+        facts.append(
+            ("left", f"{percent(result['unexplained'])} of the repeatable residual is left unexplained.")
+        )
     alike = [f"{e['name']} from {listing(e['equivalent'])}" for e in effects if e.get("equivalent")]
     if alike:
-        blocks.append(Text(f"These recordings cannot tell {listing(alike)}."))
-    experiment = _experiment(result.get("experiment"))
-    if experiment:
-        blocks.append(Facts(experiment))
-    return tuple(blocks)
+        facts.append(("not told apart", f"These recordings cannot tell {listing(alike)}."))
+    facts += _experiment(result.get("experiment"))
+    files = [str(result[key]) for key in ("model", "extended_fmu") if result.get(key)]
+    if files:
+        facts.append(("extended model", ", ".join(files)))
+    return (*blocks, Facts(facts)) if facts else tuple(blocks)
 
 
 def before_after(part: Part) -> Section | None:
     """Errors of the declared and the extended model, as multiples of the noise; None before the end."""
     result = part.result or {}
-    rows: list[tuple[str, str, Json, Json]] = []
+    rows: list[_Pair] = []
     for role in ("fit", "validate"):
         before, after = result.get("before", {}).get(role, {}), result.get("after", {}).get(role, {})
         rows += [(role, channel, error, after.get(channel, {})) for channel, error in before.items()]
     if not rows:
         return None
+    blocks: list[Block] = [_ratios_figure(part, rows), _errors_table(rows, signal_units(part.folder))]
+    declared: Json = result.get("parameters") or {}
+    if declared.get("before"):
+        blocks.append(_declared_table(declared["before"], declared.get("after") or {}))
+    return Section(f"{part.prefix}before-after", "Before and after", tuple(blocks))
+
+
+_Pair = tuple[str, str, Json, Json]
+"""Role, channel, and its error before and after; empty where there is no after."""
+
+
+def _errors_table(rows: list[_Pair], units: Json) -> Table:
     columns = [Column(text, numeric=False) for text in ("recordings", "signal", "unit")]
     columns += [
         Column(text) for text in ("rmse before", "after", "noise (1 σ)", "before / noise", "after / noise")
     ]
-    units = signal_units(part.folder)
+    columns += [Column(text) for text in ("structure before", "after")]
     table = []
     for role, channel, before, after in rows:
         ratios = [noise_ratio(error) if error else None for error in (before, after)]
-        cells = (before.get("rmse"), after.get("rmse"), before.get("noise"))
+        errors = (before.get("rmse"), after.get("rmse"), before.get("noise"))
         table.append(
             (
                 text_cell(role_text(role)),
                 text_cell(channel),
                 text_cell(before.get("unit") or units.get(channel, "")),
-                *(significant_cell(v) for v in cells),
+                *(significant_cell(v) for v in errors),
                 *(significant_cell(ratio, 3, ratio_mark(ratio)) for ratio in ratios),
+                *(significant_cell(error.get("structure"), 2) for error in (before, after)),
             )
         )
-    note = "Before: the declared model, its parameters identified again. After: the extended model likewise."
-    blocks = (_ratios_figure(part, rows), Table("Errors before and after", columns, table, note))
-    return Section(f"{part.prefix}before-after", "Before and after", blocks)
+    note = (
+        "Before: the declared model, its parameters identified again. After: the extended model likewise. Structure:"
+        " the part of the residual that is no noise."
+    )
+    return Table("Errors before and after", columns, table, note)
+
+
+def _declared_table(before: Json, after: Json) -> Table:
+    columns = [Column("declared parameter", numeric=False), Column("unit", numeric=False)]
+    columns += [Column("before"), Column("after")]
+    rows = []
+    for name, value in before.items():
+        own = [value, after.get(name) or {}]
+        cells = [Cell(plus_minus(v.get("value"), v.get("stderr")), v.get("value")) for v in own]
+        rows.append((text_cell(name), text_cell(value.get("unit", "")), *cells))
+    return Table(
+        "Declared parameters, identified again with either model ± one standard error", columns, rows
+    )
 
 
 def recordings(part: Part) -> Section | None:
@@ -90,13 +123,20 @@ def recordings(part: Part) -> Section | None:
 def candidates(part: Part) -> Section | None:
     """Every effect that was weighed, and those that these recordings cannot test."""
     result = part.result or {}
-    weighed, skipped = result.get("candidates", []), result.get("not_testable", [])
+    weighed: list[Json] = [c for c in result.get("candidates", []) if c.get("decision") != "not testable"]
+    refined = [c for c in weighed if c.get("held_out_gain") is not None]
+    others = [c for c in weighed if c.get("held_out_gain") is None]
+    skipped: list[Json] = result.get("not_testable", [])
     blocks: list[Block] = []
-    if weighed:
-        blocks.append(_candidates_table(weighed))
+    if refined:
+        blocks.append(
+            _candidates_table("Effects that were fitted and scored on held-out recordings", refined)
+        )
+    if others:
+        table = _candidates_table("Effects that promised too little to be fitted", others)
+        blocks.append(Fold(f"{count(len(others), 'effect')} that promised too little to be fitted", (table,)))
     if skipped:
-        pairs = [(s["name"], s.get("reason", "")) if isinstance(s, dict) else (s, "") for s in skipped]
-        rows = [tuple(map(text_cell, pair)) for pair in pairs]
+        rows = [(text_cell(s["name"]), text_cell(s.get("reason", ""))) for s in skipped]
         columns = (Column("effect", numeric=False), Column("why not", numeric=False))
         blocks.append(Table("Effects that these recordings cannot test", columns, rows))
     return Section(f"{part.prefix}candidates", "Effects that were weighed", tuple(blocks)) if blocks else None
@@ -108,7 +148,7 @@ def _effects_table(effects: list[Json]) -> Table:
     rows = []
     for effect in effects:
         likely, alike = effect.get("probability"), listing(effect.get("equivalent") or [])
-        named = [text_cell(effect["name"]), Cell(percent(likely, 3), likely)]
+        named = [text_cell(_name(effect)), Cell(percent(likely, 3), likely)]
         if not effect.get("parameters"):
             rows.append((*named, text_cell(DASH), Cell(DASH), text_cell(""), text_cell(alike)))
         for name, value in effect.get("parameters", {}).items():
@@ -118,26 +158,35 @@ def _effects_table(effects: list[Json]) -> Table:
     return Table("What came out: effects with their parameters ± one standard error", columns, rows)
 
 
-def _candidates_table(weighed: list[Json]) -> Table:
-    columns = [Column("effect", numeric=False), Column("variant", numeric=False), Column("held-out gain")]
-    columns += [Column("p-value"), Column("parameters", numeric=False), Column("decision", numeric=False)]
-    columns.append(Column("because", numeric=False))
-    rows = []
-    for one in weighed:
-        gain, accepted = one.get("held_out_gain"), one.get("decision") in ("accepted", "added", "chosen")
-        rows.append(
-            (
-                text_cell(one["name"]),
-                text_cell(one.get("variant") or ""),
-                Cell(percent(gain, 3), gain),
-                number_cell(one.get("p_value"), 2),
-                text_cell(_values(one.get("parameters") or {})),
-                text_cell(one.get("decision", ""), "good" if accepted else ""),
-                text_cell(one.get("reason", "")),
-            )
+def _name(effect: Json) -> str:
+    """``backlash (Backlash of the screw)``."""
+    return f"{effect['name']} ({effect['title']})" if effect.get("title") else str(effect["name"])
+
+
+def _candidates_table(title: str, weighed: list[Json]) -> Table:
+    columns = [Column("round"), Column("effect", numeric=False), Column("variant", numeric=False)]
+    columns += [Column("gain of the fit"), Column("held-out gain"), Column("p-value")]
+    columns += [Column(text, numeric=False) for text in ("parameters", "decision", "because")]
+    marks = {"accepted": "good", "rival": "good"}
+    rows = [
+        (
+            number_cell(one.get("round")),
+            text_cell(one["name"]),
+            text_cell(one.get("variant") or ""),
+            number_cell(one.get("fit_gain"), 3),
+            number_cell(one.get("held_out_gain"), 3),
+            number_cell(one.get("p_value"), 2),
+            text_cell(_values(one.get("parameters") or {})),
+            text_cell(one.get("decision", ""), marks.get(one.get("decision", ""), "")),
+            text_cell(one.get("reason", "")),
         )
-    note = "Held-out gain: by how much the error on recordings that no fit has seen falls beyond re-tuned parameters."
-    return Table("Effects that were weighed", columns, rows, note)
+        for one in weighed
+    ]
+    note = (
+        "Gains: by how much the sum of squared residuals falls beyond what declared parameters explain, in variances of"
+        " the noise; held-out on recordings that no fit has seen."
+    )
+    return Table(title, columns, rows, note)
 
 
 def _values(parameters: Json) -> str:
@@ -153,12 +202,14 @@ def _values(parameters: Json) -> str:
     return ", ".join(texts)
 
 
-def _ratios_figure(part: Part, rows: list[tuple[str, str, Json, Json]]) -> Figure:
+def _ratios_figure(part: Part, rows: list[_Pair]) -> Figure:
     drawn = Chart(f"{part.prefix}ratios", row_height=260)
     labels = [f"{channel}, {role_text(role)}" for role, channel, *_ in rows]
-    for name, colour, k in (("before", BEFORE, 2), ("after", AFTER, 3)):
-        heights = [noise_ratio(row[k]) if row[k] else None for row in rows]  # type: ignore[arg-type]
-        drawn.bars(labels, heights, name, colour=colour)
+    before = [noise_ratio(error) for *_, error, _ in rows]
+    after = [noise_ratio(error) if error else None for *_, error in rows]
+    for name, colour, heights in (("before", BEFORE, before), ("after", AFTER, after)):
+        if any(height is not None for height in heights):
+            drawn.bars(labels, heights, name, colour=colour)
     drawn.level(1.0)
     drawn.axes(y="rmse / noise [1]", x="signal and recordings [–]", y_options={"rangemode": "tozero"})
     return drawn.build(
@@ -166,16 +217,16 @@ def _ratios_figure(part: Part, rows: list[tuple[str, str, Json, Json]]) -> Figur
     )
 
 
-def _experiment(content: Json | str | None) -> list[tuple[str, str]]:
-    """What to record next, as facts."""
+def _experiment(content: Json | None) -> list[tuple[str, str]]:
+    """What to record next, as a fact."""
     if not content:
         return []
-    if isinstance(content, str):
-        return [("experiment", content)]
-    return [("experiment", f"{key.replace('_', ' ')}: {_plain(value)}") for key, value in content.items()]
-
-
-def _plain(value: object) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{k} {_plain(v)}" for k, v in value.items())
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+    apart = number(content.get("distance"), 3)
+    now = number(content.get("present"), 3)
+    return [
+        (
+            "to tell them apart",
+            f"Record {content['name']} ({content.get('file', 'experiment.csv')}): it sets {listing(content['rivals'])}"
+            f" {apart} variances of the noise apart, these recordings {now}.",
+        )
+    ]

@@ -75,10 +75,16 @@ class Study:
 
     @property
     def status(self) -> str:
-        """``complete``, ``interrupted``, ``running`` or ``stopped`` (neither finished nor running)."""
-        if any(part.running for part in (self.whole, *self.parts)):
+        """``complete``, ``interrupted``, ``running``, ``stopped`` (no process goes on with it), or ``unfinished``.
+
+        The last is a study of which no journal tells whether it runs.
+        """
+        parts = (self.whole, *self.parts)
+        if any(part.running for part in parts):
             return "running"
-        return "stopped" if self.whole.result is None else str(self.whole.result.get("status", "complete"))
+        if self.whole.result is not None:
+            return str(self.whole.result.get("status", "complete"))
+        return "stopped" if any(part.journal is not None for part in parts) else "unfinished"
 
 
 def read_study(folder: Path) -> Study:

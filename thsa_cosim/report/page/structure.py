@@ -1,19 +1,20 @@
 """What a diagnosis' residual is made of: which balance equation is at fault, and on what the residual depends."""
 
 import csv
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from thsa_cosim.report.page.chart import AFTER, BEFORE, RESIDUAL, Chart
-from thsa_cosim.report.page.content import Block, Cell, Column, Figure, Section, Table
+from thsa_cosim.report.page.content import Block, Cell, Column, Figure, Fold, Section, Table
 from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.text import number_cell, percent, text_cell
-from thsa_cosim.report.signal_files import signal_units
+from thsa_cosim.report.page.text import count, number_cell, percent, text_cell
+from thsa_cosim.signals import FloatArray
 
 STRUCTURE = "structure.csv"
-#: Panels side by side.
-COLUMNS = 3
+#: Panels side by side, and how many are shown at once.
+COLUMNS, CLEAREST = 3, 6
 
 
 def attribution(part: Part) -> Section | None:
@@ -42,14 +43,22 @@ def attribution(part: Part) -> Section | None:
 
 
 def structure(part: Part) -> Section | None:
-    """The mean residual over each variable that it may depend on, before and after; None without the table."""
+    """The mean residual over each variable that it may depend on, before and after; None without the table.
+
+    The clearest dependences come first; all of them are under a fold per channel.
+    """
     path = part.folder / STRUCTURE
-    if not path.is_file():
-        return None
-    panels = _read(path)
+    panels = _read(path) if path.is_file() else []
     if not panels:
         return None
-    return Section(f"{part.prefix}structure", "On what the residual depends", (_figure(part, panels),))
+    clearest = sorted(panels, key=lambda panel: -panel.clarity)[:CLEAREST]
+    blocks: list[Block] = [_figure(f"{part.prefix}dependence", clearest)]
+    for k, channel in enumerate(dict.fromkeys(p.channel for p in panels)):
+        own = [p for p in panels if p.channel == channel]
+        if len(panels) > CLEAREST:
+            figure = _figure(f"{part.prefix}dependence-{k}", own)
+            blocks.append(Fold(f"Residual of {channel} over {count(len(own), 'variable')}", (figure,)))
+    return Section(f"{part.prefix}structure", "On what the residual depends", tuple(blocks))
 
 
 def _shares(part: Part, balance: list[Json]) -> Figure:
@@ -65,44 +74,53 @@ def _shares(part: Part, balance: list[Json]) -> Figure:
     return drawn.build("Share of the repeatable residual by balance equation; the one at fault is marked.")
 
 
-Panel = dict[str, list[float]]
+@dataclass(frozen=True, eq=False)
+class _Panel:
+    """Mean residual of a channel in bins (n,) of a variable, with one standard error."""
+
+    variable: str
+    unit: str
+    channel: str
+    channel_unit: str
+    centre: FloatArray
+    before: FloatArray
+    after: FloatArray
+    stderr: FloatArray
+
+    @property
+    def clarity(self) -> float:
+        """How far the means are from zero, in standard errors (rms over the bins)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            far = np.array([self.before, self.after]) / self.stderr
+        known = np.isfinite(far)
+        rms = np.sqrt(np.sum(np.where(known, far, 0.0) ** 2, axis=1) / np.maximum(known.sum(axis=1), 1))
+        return float(rms.max())
 
 
-def _read(path: Path) -> dict[tuple[str, str, str, str], Panel]:
-    """Columns by (variable, its unit, channel, the channel's unit)."""
-    panels: dict[tuple[str, str, str, str], Panel] = {}
+def _read(path: Path) -> list[_Panel]:
+    rows: dict[tuple[str, str, str, str], list[list[float]]] = {}
     with path.open(newline="", encoding="utf-8") as file:
         for row in csv.DictReader(file):
-            key = row["variable"], row["unit"], row["channel"], row.get("channel_unit") or ""
-            panel = panels.setdefault(key, {"x": [], "before": [], "after": [], "stderr": []})
-            panel["x"].append(_float(row["bin_centre"]))
-            for name in ("before", "after"):
-                panel[name].append(_float(row[f"mean_{name}"]))
-            panel["stderr"].append(_float(row["stderr"]))
-    return panels
+            key = row["variable"], row["unit"], row["channel"], row["channel_unit"]
+            cells = (row[c] for c in ("bin_centre", "mean_before", "mean_after", "stderr"))
+            rows.setdefault(key, []).append([float(cell) if cell else np.nan for cell in cells])
+    return [_Panel(*key, *np.array(sorted(values), dtype=np.float64).T) for key, values in rows.items()]
 
 
-def _float(text: str) -> float:
-    return float(text) if text else float("nan")
-
-
-def _figure(part: Part, panels: dict[tuple[str, str, str, str], Panel]) -> Figure:
+def _figure(name: str, panels: list[_Panel]) -> Figure:
     columns = min(COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
-    units = signal_units(part.folder)
-    drawn = Chart(f"{part.prefix}dependence", rows=rows, columns=columns, row_height=210)
-    for k, ((variable, unit, channel, channel_unit), panel) in enumerate(panels.items()):
+    drawn = Chart(name, rows=rows, columns=columns, row_height=210)
+    for k, panel in enumerate(panels):
         at = divmod(k, columns)
-        order = np.argsort(panel["x"])
-        x, error = np.array(panel["x"])[order], 1.96 * np.array(panel["stderr"])[order]
-        for name, colour in (("before", BEFORE), ("after", AFTER)):
-            y = np.array(panel[name])[order]
-            if np.isfinite(y).any():
-                drawn.points(x, y, name, at=at, colour=colour, size=5, joined=True, error=error)
+        for label, values, colour in (("before", panel.before, BEFORE), ("after", panel.after, AFTER)):
+            error = 1.96 * panel.stderr
+            if np.isfinite(values).any():
+                drawn.points(
+                    panel.centre, values, label, at=at, colour=colour, size=5, joined=True, error=error
+                )
         drawn.level(0.0, at=at)
-        channel_unit = channel_unit or units.get(channel, "")
-        residual = f"{channel} [{channel_unit}]" if channel_unit else channel
-        drawn.axes(*at, x=f"{variable} [{unit or '1'}]", y=residual)
+        drawn.axes(*at, x=f"{panel.variable} [{panel.unit}]", y=f"{panel.channel} [{panel.channel_unit}]")
     return drawn.build(
         "Mean residual in bins of what it may depend on, with 95 % intervals; at 0 nothing is left."
     )

@@ -23,6 +23,7 @@ from thsa_cosim.report.tables import number
 _STATUS = {
     "running": "The study is running; this is how far it is. The same command writes the page anew.",
     "stopped": "The study was stopped before its end and nothing is running; what is done is kept.",
+    "unfinished": "The study has not ended yet; its folder does not tell whether it is running.",
     "interrupted": "The study was interrupted; these are the results of what was finished by then.",
 }
 
@@ -36,7 +37,8 @@ def summary(study: Study) -> Section:
         again = f" Continue with: {command}" if command and status != "running" else ""
         blocks.append(Text(_STATUS[status] + again, "bad" if status == "stopped" else ""))
     blocks.append(Facts([("asked", text) for text in _asked(study)]))
-    blocks += [Text(f"{part.title}: {_so_far(part)}") for part in study.parts if part.result is None]
+    started = [part for part in study.parts if part.result is None and part.journal is not None]
+    blocks += [Text(f"{part.title}: {_so_far(part)}") for part in started]
     result = study.whole.result
     if result is not None:
         if result.get("points"):

@@ -13,6 +13,7 @@ import click
 from thsa_cosim import __version__
 from thsa_cosim.cli.diagnose import diagnose
 from thsa_cosim.cli.identify import identify
+from thsa_cosim.cli.init import init
 from thsa_cosim.cli.models import check, export
 from thsa_cosim.cli.options import Interrupted
 from thsa_cosim.cli.report import report
@@ -21,7 +22,7 @@ from thsa_cosim.cli.tune import tune
 from thsa_cosim.errors import ThsaCosimError, did_you_mean
 
 #: In the order in which a newcomer meets them; help lists them so.
-COMMANDS: tuple[click.Command, ...] = (export, check, simulate, identify, tune, diagnose, report)
+COMMANDS: tuple[click.Command, ...] = (export, check, init, simulate, identify, tune, diagnose, report)
 
 
 class _Cli(click.Group):

@@ -1,0 +1,76 @@
+"""The command ``init``: a first scenario for an FMU and a recording."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from thsa_cosim.cli.options import PATH, console
+from thsa_cosim.errors import InputError
+
+if TYPE_CHECKING:
+    from thsa_cosim.draft import Draft
+
+
+@click.command()
+@click.option("--fmu", type=PATH, required=True, help="The FMU to simulate.")
+@click.option(
+    "--recording",
+    "recordings",
+    type=PATH,
+    multiple=True,
+    required=True,
+    help="A measured file; may be repeated.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=PATH,
+    default=Path("scenario.toml"),
+    show_default=True,
+    help="The scenario to write.",
+)
+def init(fmu: Path, recordings: tuple[Path, ...], output: Path) -> None:
+    """Write a commented scenario that drives an FMU with a recording and compares.
+
+    Columns are matched to the FMU's inputs and outputs by name, description and unit; what fits nowhere is listed in
+    the file. It runs as it is.
+    """
+    from thsa_cosim.draft import draft_scenario
+    from thsa_cosim.fmu import read_description
+    from thsa_cosim.scenario import load_scenario
+
+    if output.exists():
+        raise InputError(f"{output} exists already; choose another file with -o.")
+    draft = draft_scenario(read_description(fmu), recordings, output)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.write_text(draft.text, encoding="utf-8")
+    _print(draft)
+    try:
+        load_scenario(output)
+    except InputError as error:
+        raise InputError(f"The scenario was written, but needs your hand: {error}") from None
+    click.echo(f"\n{output} is ready: thsa-cosim simulate {output}")
+
+
+def _print(draft: "Draft") -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title="Columns of the recording as variables of the FMU", title_justify="left")
+    for heading in ("variable", "role", "column", "unit", "matched"):
+        table.add_column(heading, overflow="fold")
+    for match in draft.matches:
+        role = "input" if match.variable.causality == "input" else "output"
+        cells = (match.variable.name, role, match.column.name, match.column.unit or "not stated", match.why)
+        table.add_row(*(Text(cell) for cell in cells))
+    for variable in draft.constant:
+        value = f"constant {variable.start or 0.0:g}"
+        table.add_row(Text(variable.name), "input", "–", Text(variable.unit or ""), value)
+    for variable in draft.unmatched_outputs:
+        table.add_row(Text(variable.name), "output", "–", Text(variable.unit or ""), "not compared")
+    out = console()
+    out.print(table)
+    if draft.unmatched_columns:
+        names = ", ".join(column.name for column in draft.unmatched_columns)
+        out.print(Text(f"columns that fit nowhere: {names}"))

@@ -26,8 +26,10 @@ FIRST_SHARE, NEXT_SHARE = 0.15, 0.4
 SMALLEST_STRUCTURE = 0.05
 #: Rivals that leave less than this share of the gain unexplained cannot be told apart.
 TIE_SHARE = 0.005
-#: How many effects are refined after each screening.
-REFINED = 6
+#: How many effects are refined after each screening, if they promise at least this share of the best one's gain.
+REFINED, WORTH = 6, 0.03
+#: Once an effect leaves no structure, only those that promise this share of its gain are refined as rivals.
+RIVAL_WORTH = 0.3
 
 Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
 Say = Callable[[str], None]
@@ -111,6 +113,9 @@ def attribute(
     rounds: list[Round] = []
     accepted: list[Scored] = []
     for number in range(most):
+        left = structure(bench.of("validate"), current_held) / current_held.size
+        if accepted and left < SMALLEST_STRUCTURE**2:
+            break
         say(
             f"screening {len(candidates)} candidates"
             + (f" beside {accepted[-1].candidate.name}" if accepted else "")
@@ -147,7 +152,7 @@ def _refine_best(
     """The best proposals of the best effects, fitted with the declared parameters, best on held-out data first."""
     chosen: list[Proposal] = []
     per_effect: dict[str, int] = {}
-    worth = max(limit, 0.02 * proposals[0].gain) if proposals else limit
+    worth = max(limit, WORTH * proposals[0].gain) if proposals else limit
     for proposal in proposals:
         name = proposal.candidate.effect.name
         if proposal.gain < worth or (name not in per_effect and len(per_effect) == REFINED):
@@ -155,12 +160,18 @@ def _refine_best(
         per_effect[name] = per_effect.get(name, 0) + 1
         if per_effect[name] <= 2:
             chosen.append(proposal)
-    scored = []
+    scored: list[Scored] = []
+    solved = 0.0
     for proposal in chosen:
+        if proposal.gain < RIVAL_WORTH * solved:
+            continue
         say(f"fitting {proposal.label}")
         result = score(bench, current, held, proposal)
         if result is not None:
             scored.append(result)
+            left = structure(bench.of("validate"), result.validate) / held.size
+            if left < SMALLEST_STRUCTURE**2:
+                solved = max(solved, result.fit_gain, proposal.gain)
     return sorted(scored, key=lambda s: -s.held_out_gain)
 
 

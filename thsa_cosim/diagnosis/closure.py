@@ -9,7 +9,7 @@ import numpy as np
 from thsa_cosim.diagnosis.attribution import Scored
 from thsa_cosim.diagnosis.bench import Bench, Trial
 from thsa_cosim.diagnosis.extend import extended_class, write_extended
-from thsa_cosim.diagnosis.fit import Fit, refine
+from thsa_cosim.diagnosis.fit import Fit, cost_of, refine
 from thsa_cosim.diagnosis.problem import with_fmu
 from thsa_cosim.diagnosis.screen import unknowns_of
 from thsa_cosim.diagnosis.superset import qualified
@@ -51,9 +51,14 @@ def identify_from_drawing(
         bench = Bench(runner, own)
         starts = np.array([unknowns.start, *hints])
         found = bench.residuals(unknowns, starts, "fit")
-        usable = [(float(r @ r), v) for r, v in zip(found, starts, strict=True) if r is not None]
-        fits = [refine(bench, unknowns, vector, iterations=12) for _, vector in usable[:1] + usable[1:]]
-        best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)
+        fits: list[Fit] = []
+        for residual, vector in zip(found, starts, strict=True):
+            known = min((f.cost for f in fits), default=np.inf)
+            if residual is None or (fits and known <= cost_of(unknowns, vector, residual) + 1.0):
+                continue  # the fit so far is better than this start
+            fit = refine(bench, unknowns, vector, residual=residual, iterations=12)
+            fits += [] if fit is None else [fit]
+        best = min(fits, key=lambda f: f.cost, default=None)
         validate = None if best is None else bench.residuals(unknowns, best.vector[None, :], "validate")[0]
         if best is None or validate is None:
             reason = next(iter(bench.failures), "no run succeeded")

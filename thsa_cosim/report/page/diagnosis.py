@@ -46,7 +46,7 @@ def verdict(result: Json) -> tuple[Block, ...]:
     if alike:
         facts.append(("not told apart", f"These recordings cannot tell {listing(alike)}."))
     facts += _experiment(result.get("experiment"))
-    files = [str(result[key]) for key in ("model", "extended_fmu") if result.get(key)]
+    files = [str(result[key]) for key in ("model", "fmu") if result.get(key)]
     if files:
         facts.append(("extended model", ", ".join(files)))
     return (*blocks, Facts(facts)) if facts else tuple(blocks)

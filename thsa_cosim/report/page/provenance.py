@@ -46,7 +46,8 @@ def provenance(study: Study) -> Section:
 
 
 def _fmu(part: Part, labelled: bool) -> list[tuple[str, str]]:
-    fmu: Json = (part.result or {}).get("fmu", {})
+    result = part.result or {}
+    fmu: Json = result.get("declared_fmu") or result.get("fmu") or {}
     path = fmu.get("path") or part.about.get("fmu")
     if not path:
         return []

@@ -65,7 +65,9 @@ def _question(part: Part) -> str:
     """One sentence on what a part was to find."""
     result, about = part.result or {}, part.about
     fmu = (
-        str((result.get("fmu") or {}).get("path") or about.get("fmu", "the FMU"))
+        str(
+            (result.get("declared_fmu") or result.get("fmu") or {}).get("path") or about.get("fmu", "the FMU")
+        )
         .replace("\\", "/")
         .rsplit("/", 1)[-1]
     )
@@ -133,7 +135,8 @@ def _found_table(result: Json) -> Table:
         row += [Cell(DASH)] * (len(headings) - len(ends[name]))
         if laws:
             law = laws.get(name, {})
-            away = (law.get("largest_deviation") or {}).get("points")
+            known = law.get("identifiable", True)
+            away = (law.get("largest_deviation") or {}).get("points") if known else None
             row += [text_cell(law.get("form", DASH)), Cell(percent(away), away)]
         rows.append(row)
     note = "Red: not determined by the data." if any(c.mark == "bad" for r in rows for c in r) else ""
@@ -256,7 +259,9 @@ def _sure(study: Study) -> list[str]:
     if values:
         sentences.append(_determined(values))
     ratios = [
-        (f"{name} ({role})", r) for role, name, e in _all_errors(study) if (r := noise_ratio(e)) is not None
+        (f"{name} ({role_text(role)})", r)
+        for role, name, e in _all_errors(study)
+        if (r := noise_ratio(e)) is not None
     ]
     if ratios:
         name, worst = max(ratios, key=lambda item: item[1])

@@ -79,6 +79,13 @@ def tuned(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
     return show(write_page(folder / "study"))
 
 
+@pytest.fixture(scope="module")
+def diagnosed(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    folder = tmp_path_factory.mktemp("diagnose")
+    studies.write_diagnose(folder / "study")
+    return show(write_page(folder / "study"))
+
+
 def unfold(page: Any) -> None:
     """Open every fold and wait for what is inside."""
     for fold in page.query_selector_all("details:not([open]) > summary"):
@@ -142,23 +149,34 @@ def test_every_plot_is_drawn_with_units_on_its_axes_and_nothing_complains(
         assert page.troubles == []
 
 
-def test_axis_titles_and_panel_headings_do_not_overlap(identified: Any, tuned: Any) -> None:
-    for page in (identified, tuned):
+PANELS = """p => Object.values(p._fullLayout._plots).map(({xaxis, yaxis}) => {
+  const box = p.getBoundingClientRect();
+  return {x: box.x + xaxis._offset, y: box.y + yaxis._offset, width: xaxis._length, height: yaxis._length};
+})"""
+
+
+def overlap(a: dict[str, float], b: dict[str, float]) -> bool:
+    """Whether two boxes share more than a pixel's breadth."""
+    apart_x = a["x"] >= b["x"] + b["width"] - 1 or b["x"] >= a["x"] + a["width"] - 1
+    apart_y = a["y"] >= b["y"] + b["height"] - 1 or b["y"] >= a["y"] + a["height"] - 1
+    return not (apart_x or apart_y)
+
+
+def test_titles_and_labels_overlap_neither_each_other_nor_a_panel(
+    identified: Any, tuned: Any, diagnosed: Any
+) -> None:
+    for page in (identified, tuned, diagnosed):
         for name, plot in plots(page).items():
             texts = plot.query_selector_all(f"{AXIS_TITLE}, .annotation text, .legendtext")
-            boxes = [(t.text_content(), t.bounding_box()) for t in texts]
+            boxes = [(t.text_content(), t.evaluate("t => t.getBoundingClientRect().toJSON()")) for t in texts]
+            panels = [(f"panel {k}", box) for k, box in enumerate(plot.evaluate(PANELS))]
             for k, (first, a) in enumerate(boxes):
-                for second, b in boxes[:k]:
-                    apart_x = a["x"] >= b["x"] + b["width"] - 1 or b["x"] >= a["x"] + a["width"] - 1
-                    apart_y = a["y"] >= b["y"] + b["height"] - 1 or b["y"] >= a["y"] + a["height"] - 1
-                    assert apart_x or apart_y, (name, first, second)
+                for second, b in (*boxes[:k], *panels):
+                    assert not overlap(a, b), (name, first, second)
 
 
-def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(
-    show: Show, tmp_path: Path
-) -> None:
-    studies.write_diagnose(tmp_path)
-    page = show(write_page(tmp_path))
+def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(diagnosed: Any) -> None:
+    page = diagnosed
     summary = page.inner_text("#summary")
     assert "The model lacks backlash: added to it, the error on held-out recordings falls." in summary
     assert "backlash (Backlash of the screw)" in summary

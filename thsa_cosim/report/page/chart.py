@@ -99,7 +99,7 @@ class Chart:
 
     def _place(self, weights: FloatArray, gap: float) -> None:
         heights = weights / weights.sum() * (1.0 - gap * (self.rows - 1))
-        side = 0.09 if self.columns < 4 else 0.06
+        side = {2: 0.1, 3: 0.105}.get(self.columns, 0.06)  # room for tick labels and an axis title
         width = (1.0 - side * (self.columns - 1)) / self.columns
         top = 1.0
         for row in range(self.rows):

@@ -98,9 +98,13 @@ Block = Table | Figure | Text | Facts | Fold
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with blocks; ``name`` is its anchor. A ``part`` opens a stage of a study in stages."""
+    """A heading with blocks; ``name`` is its anchor.
+
+    ``is_part`` opens a stage of a study in stages; ``group`` is the stage that a section belongs to.
+    """
 
     name: str
     title: str
     blocks: Sequence[Block] = field(default_factory=tuple)
     is_part: bool = False
+    group: str = ""

@@ -116,10 +116,7 @@ def _laws_table(laws: Json) -> Table:
                 text_cell(law["form"] + chosen),
                 text_cell(_coefficients(law)),
                 text_cell(DASH if published is None else _coefficients(published)),
-                Cell(percent(away.get("points")), away.get("points")),
-                Cell(percent(away.get("law")), away.get("law"))
-                if determined
-                else Cell("not determined", None, "bad"),
+                *(_deviations(away) if determined else (Cell("not determined", None, "bad"), Cell(DASH))),
             )
         )
     note = (
@@ -127,6 +124,12 @@ def _laws_table(laws: Json) -> Table:
         " curve's largest value."
     )
     return Table("Laws over temperature", columns, rows, note)
+
+
+def _deviations(away: Json) -> tuple[Cell, Cell]:
+    """Largest deviations from the published curve: of the points, and of the law."""
+    points, law = away.get("points"), away.get("law")
+    return Cell(percent(points), points), Cell(percent(law), law)
 
 
 def _coefficients(law: Json) -> str:

@@ -4,7 +4,8 @@ import base64
 import hashlib
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from itertools import groupby
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -93,8 +94,8 @@ def _sections(study: Study) -> list[Section]:
     for part in study.parts:
         own = [section for build in SECTIONS.get(part.kind, ()) if (section := build(part)) is not None]
         if study.in_stages and own:
-            found.append(Section(f"{part.prefix}part", part.title, (), is_part=True))
-        found += own
+            own.insert(0, Section(f"{part.prefix}part", part.title, (), is_part=True))
+        found += [replace(section, group=part.name) for section in own]
     found += [failures(study.parts), provenance(study)]
     return [section for section in found if section is not None]
 
@@ -112,6 +113,7 @@ def render(study: Study, shown: list[Section]) -> str:
     return environment.get_template("page.html").render(
         study=study,
         sections=shown,
+        groups=[list(members) for _, members in groupby(shown, key=lambda section: section.group)],
         figures={f.name: _figure_data(f) for section in shown for f in _figures(section.blocks)},
         style=Markup(_template("page.css")),
         scripts=[Markup(text) for text in scripts],

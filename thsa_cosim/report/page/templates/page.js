@@ -18,7 +18,7 @@
   const theme = (styles) => {
     const ink = styles.getPropertyValue("--ink").trim();
     const rule = styles.getPropertyValue("--rule").trim();
-    const axis = { gridcolor: rule, zerolinecolor: rule, linecolor: rule, showline: true, ticks: "outside", tickcolor: rule, exponentformat: "power", title: { font: { size: 13 } } };
+    const axis = { gridcolor: rule, zerolinecolor: rule, linecolor: rule, showline: true, ticks: "outside", tickcolor: rule, exponentformat: "e", title: { font: { size: 13 } } };
     return {
       font: { color: ink, family: getComputedStyle(document.body).fontFamily, size: 13 },
       paper_bgcolor: "rgba(0,0,0,0)",

@@ -7,16 +7,21 @@ from thsa_cosim.recordings.recording import (
     Column,
     Recording,
     column_names,
+    load_columns,
     read_recording,
 )
+from thsa_cosim.recordings.table import RawColumn, split_unit
 
 __all__ = [
     "SUFFIXES",
     "Column",
+    "RawColumn",
     "Recording",
     "TimeAxis",
     "column_names",
+    "load_columns",
     "noise_estimate",
     "quantum",
     "read_recording",
+    "split_unit",
 ]

@@ -105,6 +105,11 @@ def column_names(path: Path | str) -> tuple[str, ...]:
     return tuple(names)
 
 
+def load_columns(path: Path | str) -> dict[str, RawColumn]:
+    """Return all columns of a file as it holds them; RecordingError as :func:`read_recording`."""
+    return _load(Path(path), lambda names: names)[0]
+
+
 def read_recording(
     path: Path | str,
     columns: Mapping[str, Column],

@@ -1,0 +1,96 @@
+"""What a recording holds: columns of numbers, with the unit that the file states or the name suggests."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from thsa_cosim.errors import RecordingError
+from thsa_cosim.recordings import load_columns, noise_estimate, split_unit
+from thsa_cosim.signals import FloatArray
+from thsa_cosim.units import is_unit, same_dimension
+
+#: Unit endings of names such as ``velocity_mm_s``, in the order in which they are tried: longest first.
+_ENDINGS = (
+    "mm/s2", "m/s2", "rad/s2", "mm/s", "um/s", "m/s", "km/h", "rad/s", "deg/s", "N.m", "Nm", "kN", "mN", "MPa",
+    "kPa", "Pa", "bar", "degC", "degF", "rpm", "Hz", "kHz", "mA", "mV", "kV", "kW", "mm", "um", "cm", "ms", "us",
+    "deg", "rad", "min", "kg", "Ohm", "N", "m", "s", "A", "V", "W", "K",
+)  # fmt: skip
+_TIME_NAMES = {"time", "t", "zeit", "temps", "timestamp", "elapsed", "seconds"}
+
+
+@dataclass(frozen=True)
+class FoundColumn:
+    """A column of numbers: its full ``name``, the ``words`` of it, its ``unit`` and ``noise`` (1 σ) in that unit.
+
+    ``stated``: whether the file itself gives the unit; otherwise the name suggests it. ``unit`` None: neither.
+    ``own_time``: the format gives the column a time axis of its own. ``increasing``: as a time axis must be.
+    """
+
+    name: str
+    words: tuple[str, ...]
+    unit: str | None
+    stated: bool
+    own_time: bool
+    increasing: bool
+    noise: float
+
+
+def find_columns(path: Path) -> tuple[FoundColumn, ...]:
+    """Return the columns of ``path`` that hold finite numbers, in its order.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be read, or holds no such column.
+    """
+    found = []
+    for name, raw in load_columns(path).items():
+        if raw.problem or raw.values.size < 2 or not np.isfinite(raw.values).all():
+            continue
+        plain, unit = split_unit(name.rsplit("/", 1)[-1])
+        stated = raw.unit if raw.unit is not None and is_unit(raw.unit) else unit
+        stem, suggested = (plain, None) if stated else _ending(plain)
+        found.append(
+            FoundColumn(
+                name=name,
+                words=words(stem),
+                unit=stated or suggested,
+                stated=stated is not None,
+                own_time=raw.time is not None,
+                increasing=_increases(raw.values),
+                noise=noise_estimate(raw.values),
+            )
+        )
+    if not found:
+        raise RecordingError(f"{path}: holds no column of finite numbers; repair or export it again.")
+    return tuple(found)
+
+
+def time_column(columns: Sequence[FoundColumn]) -> FoundColumn | None:
+    """Return the column that is time: an increasing one, by its name, else by its unit; None if there is none."""
+    rising = [c for c in columns if c.increasing and (c.unit is None or same_dimension(c.unit, "s"))]
+    named = [c for c in rising if _TIME_NAMES & {word.lower() for word in c.words}]
+    timed = [c for c in rising if c.unit is not None]
+    return next(iter([*named, *timed]), None)
+
+
+def _ending(name: str) -> tuple[str, str | None]:
+    """Return a name without the unit that it ends with, and that unit: ``position_m``, but not ``w_m``."""
+    for unit in _ENDINGS:
+        ending = re.sub(r"\W", "_", unit)
+        match = re.fullmatch(rf"(.+)[_ .-]{re.escape(ending)}", name)
+        if match and (len(unit) > 1 or any(len(word) > 2 for word in words(match[1]))):
+            return match[1], unit
+    return name, None
+
+
+def words(text: str) -> tuple[str, ...]:
+    """Return the words of a name or a sentence: ``motorSpeed_2`` gives motor, Speed, 2."""
+    return tuple(re.findall(r"[A-Z]?[^\W\d_A-Z]+|[A-Z]+(?![^\W\d_A-Z])|\d+", text))
+
+
+def _increases(values: FloatArray) -> bool:
+    return bool((np.diff(values) > 0.0).all())

@@ -1,0 +1,250 @@
+"""The commented scenario: it loads and runs as it is, and says what to change for more."""
+
+import json
+import math
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from thsa_cosim.draft.columns import FoundColumn, find_columns, time_column
+from thsa_cosim.draft.match import Match, match_columns
+from thsa_cosim.fmu import FmuDescription, Variable
+from thsa_cosim.units import same_dimension
+
+_MOST_PARAMETERS = 60
+"""So many of the FMU's parameters are listed."""
+
+
+@dataclass(frozen=True)
+class Draft:
+    """The ``text`` of a scenario, and what it rests on.
+
+    ``matches``: what is driven and compared. ``constant``: inputs without a column.
+    """
+
+    text: str
+    matches: tuple[Match, ...]
+    constant: tuple[Variable, ...]
+    unmatched_columns: tuple[FoundColumn, ...]
+    unmatched_outputs: tuple[Variable, ...]
+
+
+def draft_scenario(fmu: FmuDescription, recordings: Sequence[Path], target: Path) -> Draft:
+    """Draft a scenario of kind "simulate" for an FMU and recordings that share their columns.
+
+    Parameters
+    ----------
+    recordings
+        Files of one format; the first is looked into.
+    target
+        Where the scenario will stand: its paths are relative to it.
+
+    Raises
+    ------
+    RecordingError
+        If the first recording cannot be read, or holds no column of numbers.
+    """
+    return draft_from_columns(fmu, find_columns(recordings[0]), recordings, target)
+
+
+def draft_from_columns(
+    fmu: FmuDescription, columns: Sequence[FoundColumn], recordings: Sequence[Path], target: Path
+) -> Draft:
+    """Draft as :func:`draft_scenario`, from columns that were found."""
+    columns = [column for column in columns if _is_name(column.name)]
+    time = time_column(columns)
+    rest = [column for column in columns if column is not time]
+    outputs = [v for v in fmu.outputs if v.type != "String" and not v.is_array and _is_name(v.name)]
+    inputs = [v for v in fmu.inputs if v.is_float and not v.is_array and _is_name(v.name)]
+    matches = match_columns([*inputs, *outputs], rest)
+    taken = {match.variable.name for match in matches}
+    constant = tuple(v for v in inputs if v.name not in taken)
+    unmatched_outputs = tuple(v for v in outputs if v.name not in taken)
+    used = {match.column.name for match in matches}
+    unmatched_columns = tuple(c for c in rest if c.name not in used)
+    temperature = next((m for m in matches if m.variable in inputs and _is_temperature(m.variable)), None)
+    parts = [
+        _head(fmu, recordings, target),
+        _time(time),
+        *(_signal(match, match is temperature) for match in matches),
+        *(_constant(variable) for variable in constant),
+        _left_out(unmatched_columns, unmatched_outputs),
+        _temperature(temperature),
+        _fixed(fmu),
+        _simulation(fmu),
+        _identify(fmu),
+    ]
+    text = "\n".join(part for part in parts if part)
+    return Draft(text, matches, constant, unmatched_columns, unmatched_outputs)
+
+
+def _head(fmu: FmuDescription, recordings: Sequence[Path], target: Path) -> str:
+    listed = ", ".join(_quoted(_relative(path, target)) for path in recordings)
+    return f"""\
+# A first scenario for {_plain(fmu.path.name)}, drafted by thsa-cosim init. It simulates the FMU once per recording and
+# compares: thsa-cosim simulate {_plain(target.name)}
+# docs/scenario.md lists every key. See at the end for what to change to identify parameters.
+kind = "simulate"
+title = {_quoted(f"{fmu.model_name}: simulated against measured")}
+fmu = {_quoted(_relative(fmu.path, target))}
+
+[recordings]
+fit = [{listed}]
+validate = []            # held out: only scored, never fitted
+"""
+
+
+def _time(time: FoundColumn | None) -> str:
+    if time is None:
+        return "# No time column: every channel brings its own time.\n"
+    unit = time.unit or "s"
+    known = "" if time.unit else "  # assumed: neither the file nor the name says"
+    return f"[recordings.time]\ncolumn = {_quoted(time.name)}\nunit = {_quoted(unit)}{known}\n"
+
+
+def _signal(match: Match, is_temperature: bool) -> str:
+    variable, column = match.variable, match.column
+    role = "input" if variable.causality == "input" else "output, compared"
+    lines = [
+        f"# {role}: {_plain(variable.description) or _plain(variable.name)}; matched {match.why}",
+        f"[recordings.columns.{_key(variable.name)}]",
+        f"column = {_quoted(column.name)}",
+    ]
+    if column.unit is not None:
+        origin = "" if column.stated else "  # from the column's name"
+        lines.append(f"unit = {_quoted(column.unit)}{origin}")
+    elif variable.unit:
+        lines.append(f"unit = {_quoted(variable.unit)}  # assumed: the FMU's; the file does not say")
+    if is_temperature:
+        lines.append('smooth = "mean"')
+    elif variable.causality == "input" and column.noise > 0.0:
+        noise = f"{column.noise:.2g} {column.unit or ''}".rstrip()
+        lines.append(f'# smooth = "piecewise-linear"  # plateaus and ramps below its noise of about {noise}')
+    if variable.causality == "input" and not is_temperature:
+        lines.append('# interpolation = "hold"  # if a controller holds the value until the next sample')
+    return "\n".join(lines) + "\n"
+
+
+def _constant(variable: Variable) -> str:
+    unit = [f"unit = {_quoted(variable.unit)}"] if variable.unit else []
+    return (
+        "\n".join(
+            [
+                f"# input: {_plain(variable.description) or _plain(variable.name)}; no column fits, so it is constant",
+                f"[recordings.columns.{_key(variable.name)}]",
+                f"value = {_number(variable.start)}",
+                *unit,
+            ]
+        )
+        + "\n"
+    )
+
+
+def _left_out(columns: Sequence[FoundColumn], outputs: Sequence[Variable]) -> str:
+    lines = []
+    if columns:
+        lines.append("# Columns that no variable fits:")
+        lines += [f"#   {_plain(c.name)}{f' [{_plain(c.unit)}]' if c.unit else ''}" for c in columns]
+    if outputs:
+        lines.append("# Outputs of the FMU without a column; to compare one, give its column:")
+        for variable in outputs:
+            unit = f", unit = {_quoted(variable.unit)}" if variable.unit else ""
+            lines.append(
+                f'#   [recordings.columns.{_key(variable.name)}]  column = "..."{unit}'
+                f"  # {_plain(variable.description)}".rstrip(" #")
+            )
+    return "\n".join(lines) + "\n" if lines else ""
+
+
+def _temperature(match: Match | None) -> str:
+    if match is None:
+        return ""
+    return (
+        "# Recordings are grouped by the mean of this input.\n"
+        f"[temperature]\ninput = {_quoted(match.variable.name)}\nround_to = 1.0\n"
+    )
+
+
+def _fixed(fmu: FmuDescription) -> str:
+    known = [v for v in fmu.parameters if v.is_float and not v.is_array]
+    lines = ["# Start values for every run, in the FMU's units.", "[fixed]"]
+    for variable in known[:_MOST_PARAMETERS]:
+        about = f"  # {_about(variable)}" if _about(variable) else ""
+        lines.append(f"# {_key(variable.name)} = {_number(variable.start)}{about}")
+    if len(known) > _MOST_PARAMETERS:
+        lines.append(f"# ... and {len(known) - _MOST_PARAMETERS} more in the FMU's modelDescription.xml")
+    return "\n".join(lines) + "\n"
+
+
+def _simulation(fmu: FmuDescription) -> str:
+    tolerance = fmu.default_experiment.tolerance if fmu.default_experiment else None
+    shown = _number(tolerance or 1e-6)
+    return (
+        "[simulation]\n"
+        f"# tolerance = {shown}      # relative; left out: the FMU's own\n"
+        "# step = 0.001           # s between communication points; left out: the recording's samples\n"
+        "deadline = 60.0          # s; a run that takes longer counts as failed\n"
+    )
+
+
+def _identify(fmu: FmuDescription) -> str:
+    example = next((v for v in fmu.parameters if v.is_float and not v.is_array), None)
+    if example is None:
+        return ""
+    start = example.start or 1.0
+    low, high = sorted((0.2 * start, 5.0 * start))
+    unit = example.unit or "1"
+    return f"""\
+# To identify parameters: set kind = "identify" above, run thsa-cosim identify, and take one of these per parameter.
+# [[parameters]]
+# name = {_quoted(re.sub(r"[^A-Za-z0-9_]+", "_", example.name))}
+# variable = {_quoted(example.name)}
+# unit = {_quoted(unit)}
+# lower = {_number(low)}
+# upper = {_number(high)}
+# scale = "linear"         # or "log", for bounds that span decades
+"""
+
+
+def _is_name(name: str) -> bool:
+    """Whether a scenario can hold the name."""
+    return re.fullmatch(r"[^\x00-\x1f\x7f]+", name) is not None
+
+
+def _is_temperature(variable: Variable) -> bool:
+    return bool(variable.unit) and same_dimension(str(variable.unit), "K")
+
+
+def _about(variable: Variable) -> str:
+    unit = f"[{_plain(variable.unit)}]" if variable.unit else ""
+    return " ".join(part for part in (unit, _plain(variable.description)) if part)
+
+
+def _relative(path: Path, target: Path) -> str:
+    """``path`` as seen from the scenario, absolute if it lies far away."""
+    try:
+        relative = Path(os.path.relpath(path.resolve(), target.resolve().parent)).as_posix()
+    except ValueError:  # another drive
+        return path.resolve().as_posix()
+    return relative if relative.count("../") <= 3 else path.resolve().as_posix()
+
+
+def _quoted(text: str) -> str:
+    """A TOML string: JSON's escapes are TOML's, except for the delete character."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _quoted(name)
+
+
+def _plain(text: str | None) -> str:
+    """Text that cannot leave its comment."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text or "").split())
+
+
+def _number(value: float | None) -> str:
+    """A TOML float: Python's shortest digits, which always hold a dot or an exponent; 0 for none."""
+    return repr(float(value)) if value is not None and math.isfinite(value) else "0.0"

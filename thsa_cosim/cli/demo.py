@@ -1,0 +1,189 @@
+"""The command ``demo``: the whole loop on the shipped data, each step as the command that does it."""
+
+import importlib.util
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from thsa_cosim.api import DiagnoseStudy, IdentifyStudy, TuneStudy, open_study
+from thsa_cosim.cli.options import PATH
+from thsa_cosim.errors import InputError, StudyError
+
+_NEEDED = ("scenarios/motor.toml", "scenarios/table4.toml", "scenarios/driven.toml", "modelica/THSA")
+_EXPORTER = ("rumoca", "casadi", "ziglang")
+#: Temperatures of the motor bench that are identified: a double exponential needs four.
+_SOME, _FEW = ("m55", "m40", "m20", "p00", "p25"), ("m55", "m30", "p00", "p25")
+
+
+@dataclass(frozen=True)
+class Step:
+    """One command of the demo: why it is there, its words, and what came out as sentences."""
+
+    title: str
+    why: str
+    words: tuple[str, ...]
+    outcome: Callable[[], list[str]]
+    folder: Path | None = None
+    """Where its page is, if it is a study."""
+    needs_exporter: bool = False
+
+
+@click.command()
+@click.option(
+    "-o",
+    "--output",
+    type=PATH,
+    default=Path("demo"),
+    show_default=True,
+    help="Folder; an existing one continues.",
+)
+@click.option("--quick", is_flag=True, help="Fewer temperatures and recordings.")
+def demo(output: Path, quick: bool) -> None:
+    """Run the whole loop on the shipped data: export, check, identify, tune, diagnose, report.
+
+    Each step is a command of its own, which is shown with what it found. Takes a few minutes and a checkout of the
+    repository; the pages are linked from index.html in the folder.
+    """
+    from thsa_cosim.report.index_page import Entry, write_index
+
+    root = _checkout()
+    can_export = all(importlib.util.find_spec(name) for name in _EXPORTER)
+    steps = _steps(root, output, quick, can_export)
+    output.mkdir(parents=True, exist_ok=True)
+    begin, entries = time.monotonic(), []
+    for number, step in enumerate(steps, start=1):
+        if step.needs_exporter and not can_export:
+            click.echo(
+                f"\n{number}/{len(steps)} {step.title}: left out, it needs pip install 'thsa-cosim[export]'."
+            )
+            continue
+        click.secho(f"\n{number}/{len(steps)} {step.title}", bold=True)
+        click.echo(f"{step.why}\n$ thsa-cosim {' '.join(step.words)}")
+        started = time.monotonic()
+        _run(step)
+        found = step.outcome()
+        for sentence in found:
+            click.secho(f"→ {sentence}", bold=True)
+        page = None if step.folder is None else step.folder / "report.html"
+        seconds = time.monotonic() - started
+        entries.append(Entry(step.title, step.why, step.words, tuple(found), seconds, page))
+    index = write_index(output / "index.html", "thsa-cosim: the whole loop on the shipped data", entries)
+    click.echo(f"\nAll of it took {time.monotonic() - begin:.0f} s. Open {index}")
+
+
+def _steps(root: Path, output: Path, quick: bool, can_export: bool) -> list[Step]:
+    from thsa_cosim.fmu.native import platform_folders
+
+    scenarios, recordings = root / "scenarios", root / "scenarios" / "recordings"
+    fmu = output / "THSA.fmu" if can_export else root / "fmus" / "THSA.fmu"
+    host = ("--platforms", platform_folders("3.0")[0])
+    fit = [w for t in (_FEW if quick else _SOME) for w in ("--fit", str(recordings / f"motor_{t}.parquet"))]
+    one = ["--fit", str(recordings / "undeclared_fit_1.parquet")]
+    one += ["--validate", str(recordings / "undeclared_validate_1.parquet")]
+    identify, tune, diagnose = (output / name for name in ("identify", "tune", "diagnose"))
+    return [
+        Step(
+            "Export the actuator's Modelica model as an FMU",
+            "Equations become C code with an exact Jacobian, and a solver goes with them into one .fmu file.",
+            ("export", "THSA.Actuator", "--package", str(root / "modelica" / "THSA"), *host, "-o", str(fmu)),
+            lambda: [f"{fmu.name} of {fmu.stat().st_size / 1e6:.1f} MB"],
+            needs_exporter=True,
+        ),
+        Step(
+            "Check what the FMU can be trusted with",
+            "Repeated, reset and finer-stepped runs are compared, as they should be with any FMU.",
+            ("check", str(fmu)),
+            list,
+        ),
+        Step(
+            "Identify the motor from its bench recordings, over temperature",
+            "A differential evolution and a least-squares polish find four parameters at each temperature; laws go "
+            "through them.",
+            ("identify", str(scenarios / "motor.toml"), *fit, "-o", str(identify)),
+            lambda: _identified(identify),
+            identify,
+        ),
+        Step(
+            "Tune the velocity controller at -30 degC against 55 kN",
+            "The same search finds gains for a ramp, within limits on overshoot, current, bandwidth and margins.",
+            ("tune", str(scenarios / "table4.toml"), "--fmu", str(fmu), "-o", str(tune)),
+            lambda: _tuned(tune),
+            tune,
+        ),
+        Step(
+            "Diagnose a recording that shows an effect the model lacks",
+            "The residual is traced to an effect of the catalogue, which is added to the Modelica model and judged by "
+            "recordings that no fit touched.",
+            ("diagnose", str(scenarios / "driven.toml"), *(one if quick else ()), "-o", str(diagnose)),
+            lambda: _diagnosed(diagnose),
+            diagnose,
+            needs_exporter=True,
+        ),
+    ]
+
+
+def _run(step: Step) -> None:
+    """Run the step's command here; StudyError if it fails, which it has explained by then."""
+    from thsa_cosim.cli.main import run_command
+
+    code = run_command(list(step.words))
+    if code == 130:
+        raise KeyboardInterrupt
+    if code:
+        raise StudyError(
+            f"The step {step.title!r} failed (exit code {code}); the same command goes on from here."
+        )
+
+
+def _identified(folder: Path) -> list[str]:
+    study = open_study(folder)
+    assert isinstance(study, IdentifyStudy)
+    laws, errors = study.laws, study.recordings["rmse / noise"].groupby(level="signal").mean()
+    away = ", ".join(f"{name} {100.0 * value:.2g} %" for name, value in laws["largest deviation"].items())
+    left = ", ".join(f"{name} {value:.2f}" for name, value in errors.items())
+    points = study.parameters.index.get_level_values("point").nunique()
+    return [
+        f"laws from {points} temperatures lie within so much of the published ones: {away}",
+        f"errors left, in units of the sensors' noise: {left}",
+    ]
+
+
+def _tuned(folder: Path) -> list[str]:
+    study = open_study(folder)
+    assert isinstance(study, TuneStudy)
+    table, terms = study.parameters, study.terms
+    gains = [
+        f"{n} {table['before'][n]:.3g} → {table['value'][n]:.3g} {table['unit'][n]}" for n in table.index
+    ]
+    shown = ("rise_time", "steady_state_error", "overshoot")
+    change = [f"{n.replace('_', ' ')} {terms['before'][n]:.3g} → {terms['after'][n]:.3g}" for n in shown]
+    return [f"gains: {', '.join(gains)}", f"response: {', '.join(change)}"]
+
+
+def _diagnosed(folder: Path) -> list[str]:
+    study = open_study(folder)
+    assert isinstance(study, DiagnoseStudy)
+    effects, errors = study.effects, study.held_out
+    found = [
+        f"{effect}: {name} = {value:.3g} ± {stderr:.1g} {unit}"
+        for (effect, name), value, stderr, unit in zip(
+            effects.index.tolist(), effects["value"], effects["stderr"], effects["unit"], strict=True
+        )
+    ]
+    left = [
+        f"{n} {errors['before'][n] / errors['noise'][n]:.2f} → {errors['after'][n] / errors['noise'][n]:.2f}"
+        for n in errors.index
+        if errors["noise"][n]
+    ]
+    return [f"verdict: {study.verdict}", *found, f"held-out errors in units of noise: {', '.join(left)}"]
+
+
+def _checkout() -> Path:
+    """Return the folder with the shipped data: here, or where an editable installation comes from."""
+    for root in (Path(), Path(__file__).parents[2]):
+        if all((root / name).exists() for name in _NEEDED):
+            return root
+    raise InputError("The demo needs the shipped scenarios: run it in a checkout of the repository.")

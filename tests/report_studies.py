@@ -269,7 +269,7 @@ def diagnose_result() -> dict[str, Any]:
         "after": {"fit": after, "validate": after},
         "unexplained": 0.02,
         "model": "THSA_with_backlash.mo",
-        "extended_fmu": "THSA_with_backlash.fmu",
+        "fmu": "THSA_with_backlash.fmu",
         "parameters": {
             "before": {"J": {"value": 2.1e-3, "unit": "kg.m2", "stderr": 1e-5}},
             "after": {"J": {"value": 2.0e-3, "unit": "kg.m2", "stderr": 1e-5}},
@@ -313,7 +313,7 @@ def diagnose_result() -> dict[str, Any]:
         "seed": 7,
         "evaluations": 300,
         "failures": {},
-        "fmu": {"path": "THSA.fmu", "sha256": "a" * 64},
+        "declared_fmu": {"path": "fmus/THSA.fmu", "sha256": "a" * 64},
         "scenario": "driven.toml",
         "version": "0.1.0",
     }
@@ -338,5 +338,6 @@ def write_diagnose(folder: Path) -> dict[str, Any]:
     for k, (variable, unit) in enumerate(variables.items()):
         # The later a variable, the more clearly the residual depends on it.
         lines += [f"{variable},{x / 10},{unit},v,m/s,{1e-5 * k * np.sign(x)},0.0,1e-6" for x in range(-5, 6)]
+    lines += [f"x,{x / 10},m,i_q,A,{1e-3 * x},0.0,1e-4" for x in range(-5, 6)]
     (folder / "structure.csv").write_text("\n".join(lines) + "\n")
     return result

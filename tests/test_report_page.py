@@ -178,14 +178,17 @@ def test_titles_and_labels_overlap_neither_each_other_nor_a_panel(
 def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(diagnosed: Any) -> None:
     page = diagnosed
     summary = page.inner_text("#summary")
-    assert "The model lacks backlash: added to it, the error on held-out recordings falls." in summary
-    assert "backlash (Backlash of the screw)" in summary
+    assert "The model lacks backlash (Backlash of the screw): added to it, the error on held-out" in summary
+    assert "Find out which physical effect THSA.fmu lacks" in summary
+    assert "THSA_with_backlash.mo, THSA_with_backlash.fmu" in summary
+    assert "fmus/THSA.fmu, SHA-256 aaaa" in page.inner_text("#provenance")
     assert "(2.50 ± 0.10)e-4" in summary
     assert "These recordings cannot tell backlash from velocity-sensor-delay." in summary
     assert (
         "Record slow reversals under no load (experiment.csv): it sets backlash and velocity-sensor-delay 812"
         in summary
     )
+    assert "largest error falls from 5 × the sensor's noise to 1.05 × noise" in summary
     assert "2 % of the repeatable residual is left unexplained." in summary
     errors = table_of(page, "Errors before and after")
     assert cells(errors, "after / noise") == ["1.05", "1.05"]
@@ -198,11 +201,20 @@ def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(diag
     assert cells(table_of(page, "Effects that these recordings cannot test"), "effect") == [
         "winding-self-heating"
     ]
-    assert set(found) == {"balance", "ratios", "dependence", "dependence-0", "signals-0", "signals-1"}
+    assert set(found) == {
+        "balance",
+        "ratios",
+        "dependence",
+        "dependence-0",
+        "dependence-1",
+        "signals-0",
+        "signals-1",
+    }
     assert len(found["balance"].query_selector_all(".barlayer .point path")) == 2
-    # The clearest six of the seven come first.
-    clearest = [title for title in axis_titles(found["dependence"]) if title != "v [m/s]"]
-    assert clearest == ["u_q [V]", "i_q [A]", "w_m [rad/s]", "x [m]", "F_load [N]", "v_cmd [m/s]"]
+    # Each channel's clearest dependence stands out, the others are below in order.
+    assert axis_titles(found["dependence"]) == ["u_q [V]", "x [m]", "v [m/s]", "i_q [A]"]
+    order = axis_titles(found["dependence-0"])[:7]
+    assert order == ["u_q [V]", "i_q [A]", "w_m [rad/s]", "x [m]", "F_load [N]", "v_cmd [m/s]", "time [s]"]
     names = found["signals-0"].evaluate("p => p._fullData.map(t => t.name)")
     assert names == ["measured", "before", "after", "residual before", "residual after"]
     assert page.troubles == []

@@ -248,7 +248,11 @@ class Chart:
         )
 
     def build(self, caption: str, **layout: Any) -> Figure:
-        """The finished figure."""
+        """The finished figure; without a legend it needs less room above."""
+        if not any(entry["showlegend"] for entry in self._data):
+            self.height -= _PIXELS_ABOVE - 32
+            self._layout["margin"]["t"] = 32
+            self._layout["height"] = self.height
         return Figure(self.name, self._data, {**self._layout, **layout}, self.height, caption)
 
 

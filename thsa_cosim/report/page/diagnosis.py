@@ -30,7 +30,7 @@ def verdict(result: Json) -> tuple[Block, ...]:
     """What the summary says first: the verdict, each effect with its parameters, and what would tell rivals apart."""
     word = str(result["verdict"])
     effects: list[Json] = result.get("effects", [])
-    names = listing([e["name"] for e in effects])
+    names = listing([_name(e) for e in effects])
     sentence = _VERDICTS.get(word, word).format(effects=names)
     if word == "unexplained-structure" and effects:
         sentence += f" What was found all the same: {names}."
@@ -50,6 +50,23 @@ def verdict(result: Json) -> tuple[Block, ...]:
     if files:
         facts.append(("extended model", ", ".join(files)))
     return (*blocks, Facts(facts)) if facts else tuple(blocks)
+
+
+def held_out(result: Json) -> str:
+    """One sentence on how far the error on held-out recordings fell; empty without such recordings."""
+    ratios = [
+        [r for e in result.get(when, {}).get("validate", {}).values() if (r := noise_ratio(e)) is not None]
+        for when in ("before", "after")
+    ]
+    if not ratios[0]:
+        return ""
+    now = number(max(ratios[0]), 3)
+    if not ratios[1]:
+        return f"On recordings that no fit has seen the largest error is {now} × the sensor's noise."
+    return (
+        f"On recordings that no fit has seen the largest error falls from {now} × the sensor's noise to"
+        f" {number(max(ratios[1]), 3)} × noise."
+    )
 
 
 def before_after(part: Part) -> Section | None:
@@ -88,7 +105,8 @@ def _errors_table(rows: list[_Pair], units: Json) -> Table:
                 text_cell(channel),
                 text_cell(before.get("unit") or units.get(channel, "")),
                 *(significant_cell(v) for v in errors),
-                *(significant_cell(ratio, 3, ratio_mark(ratio)) for ratio in ratios),
+                significant_cell(ratios[0]),
+                significant_cell(ratios[1], 3, ratio_mark(ratios[1])),
                 *(significant_cell(error.get("structure"), 2) for error in (before, after)),
             )
         )
@@ -148,7 +166,7 @@ def _effects_table(effects: list[Json]) -> Table:
     rows = []
     for effect in effects:
         likely, alike = effect.get("probability"), listing(effect.get("equivalent") or [])
-        named = [text_cell(_name(effect)), Cell(percent(likely, 3), likely)]
+        named = [text_cell(_name(effect)), Cell(_probability(likely), likely)]
         if not effect.get("parameters"):
             rows.append((*named, text_cell(DASH), Cell(DASH), text_cell(""), text_cell(alike)))
         for name, value in effect.get("parameters", {}).items():
@@ -158,21 +176,25 @@ def _effects_table(effects: list[Json]) -> Table:
     return Table("What came out: effects with their parameters ± one standard error", columns, rows)
 
 
+def _probability(share: float | None) -> str:
+    """``99 %``; never 100 %, of which no recording makes sure."""
+    return "> 99.9 %" if share is not None and share > 0.999 else percent(share, 3)
+
+
 def _name(effect: Json) -> str:
     """``backlash (Backlash of the screw)``."""
     return f"{effect['name']} ({effect['title']})" if effect.get("title") else str(effect["name"])
 
 
 def _candidates_table(title: str, weighed: list[Json]) -> Table:
-    columns = [Column("round"), Column("effect", numeric=False), Column("variant", numeric=False)]
+    columns = [Column("round"), Column("effect", numeric=False)]
     columns += [Column("gain of the fit"), Column("held-out gain"), Column("p-value")]
     columns += [Column(text, numeric=False) for text in ("parameters", "decision", "because")]
     marks = {"accepted": "good", "rival": "good"}
     rows = [
         (
             number_cell(one.get("round")),
-            text_cell(one["name"]),
-            text_cell(one.get("variant") or ""),
+            text_cell(one.get("variant") or one["name"]),
             number_cell(one.get("fit_gain"), 3),
             number_cell(one.get("held_out_gain"), 3),
             number_cell(one.get("p_value"), 2),
@@ -190,15 +212,11 @@ def _candidates_table(title: str, weighed: list[Json]) -> Table:
 
 
 def _values(parameters: Json) -> str:
-    """``gap = 2.5e-4 ± 1e-5 m``, for parameters with or without unit and error."""
+    """``gap = (2.50 ± 0.10)e-4 m, …``."""
     texts = []
     for name, value in parameters.items():
-        if isinstance(value, dict):
-            texts.append(
-                f"{name} = {plus_minus(value['value'], value.get('stderr'))} {value.get('unit', '')}".strip()
-            )
-        else:
-            texts.append(f"{name} = {plus_minus(value, None)}")
+        unit = "" if value.get("unit") in (None, "1") else f" {value['unit']}"
+        texts.append(f"{name} = {plus_minus(value['value'], value.get('stderr'))}{unit}")
     return ", ".join(texts)
 
 

@@ -37,6 +37,14 @@ class Part:
         return str(found or self.folder.resolve().name)
 
     @property
+    def fmu(self) -> Json:
+        """``path`` and ``sha256`` of the FMU that was run, as far as they are known."""
+        result = self.result or {}
+        # A diagnosis calls the one with what it found "fmu".
+        found = result.get("declared_fmu") or result.get("fmu")
+        return found if isinstance(found, dict) else {"path": self.about.get("fmu")}
+
+    @property
     def prefix(self) -> str:
         """What makes the names of this part's sections and figures unique on the page."""
         return re.sub(r"\W+", "-", self.name) + "-" if self.name else ""

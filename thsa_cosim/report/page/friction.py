@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from thsa_cosim.report.friction import ELEMENTS, surface
-from thsa_cosim.report.page.chart import Chart, packed
-from thsa_cosim.report.page.content import Block, Section
+from thsa_cosim.report.friction import ELEMENTS, Element, surface
+from thsa_cosim.report.page.chart import Chart, packed, plain
+from thsa_cosim.report.page.content import Figure, Section
 from thsa_cosim.report.page.folder import Json
 from thsa_cosim.report.page.parameters import read_law
 
@@ -20,31 +20,35 @@ def friction(result: Json, prefix: str = "") -> Section | None:
     known = [e for e in ELEMENTS if e.coulomb in laws and e.viscous in laws]
     if not temperatures or not known:
         return None
-    temperature = np.linspace(min(temperatures), max(temperatures), STEPS)
-    blocks: list[Block] = []
-    for element in known:
-        speed = np.linspace(0.0, element.fastest, STEPS)
-        values = surface(read_law(laws[element.coulomb]), read_law(laws[element.viscous]), speed, temperature)
-        unit = laws[element.coulomb]["unit"]
-        drawn = Chart(f"{prefix}friction-{element.title}", row_height=300)
-        drawn.add(
-            0,
-            0,
-            "",
-            type="contour",
-            x=packed(speed),
-            y=packed(temperature),
-            z=packed(values),
-            ncontours=20,
-            colorscale="Viridis",
-            contours={"showlabels": True, "labelfont": {"color": "white", "size": 11}},
-            line={"width": 0.5, "color": "white"},
-            colorbar={"title": {"text": f"friction [{unit}]", "side": "right", "font": {"size": 13}}},
-            hovertemplate="speed %{x:.3g}<br>temperature %{y:.3g} °C<br>friction %{z:.4g}<extra></extra>",
-        )
-        drawn.axes(x=f"speed [{element.unit}]", y="temperature [°C]")
-        drawn.title(f"Friction of the {element.title}: {element.coulomb} + {element.viscous} |v|")
-        blocks.append(
-            drawn.build(f"Friction of the {element.title} by the identified laws, at its own speed.")
-        )
-    return Section(f"{prefix}friction", "Friction over speed and temperature", tuple(blocks))
+    span = min(temperatures), max(temperatures)
+    figures = tuple(_figure(f"{prefix}friction-{e.title}", e, laws, span) for e in known)
+    return Section(f"{prefix}friction", "Friction over speed and temperature", figures)
+
+
+def _figure(name: str, element: Element, laws: Json, span: tuple[float, float]) -> Figure:
+    speed, temperature = np.linspace(0.0, element.fastest, STEPS), np.linspace(*span, STEPS)
+    values = surface(read_law(laws[element.coulomb]), read_law(laws[element.viscous]), speed, temperature)
+    title = {
+        "text": plain(f"friction [{laws[element.coulomb]['unit']}]"),
+        "side": "right",
+        "font": {"size": 13},
+    }
+    drawn = Chart(name, row_height=300)
+    drawn.add(
+        0,
+        0,
+        "",
+        type="contour",
+        x=packed(speed),
+        y=packed(temperature),
+        z=packed(values),
+        ncontours=20,
+        colorscale="Viridis",
+        contours={"showlabels": True, "labelfont": {"color": "white", "size": 11}, "labelformat": "~g"},
+        line={"width": 0.5, "color": "white"},
+        colorbar={"tickformat": "~g", "title": title},
+        hovertemplate="speed %{x:.3g}<br>temperature %{y:.3g} °C<br>friction %{z:.4g}<extra></extra>",
+    )
+    drawn.axes(x=f"speed [{element.unit}]", y="temperature [°C]")
+    drawn.title(f"Friction of the {element.title}: {element.coulomb} + {element.viscous} |v|")
+    return drawn.build(f"Friction of the {element.title} by the identified laws, at its own speed.")

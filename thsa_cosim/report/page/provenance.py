@@ -46,13 +46,10 @@ def provenance(study: Study) -> Section:
 
 
 def _fmu(part: Part, labelled: bool) -> list[tuple[str, str]]:
-    result = part.result or {}
-    fmu: Json = result.get("declared_fmu") or result.get("fmu") or {}
-    path = fmu.get("path") or part.about.get("fmu")
-    if not path:
+    if not part.fmu.get("path"):
         return []
-    digest = f", SHA-256 {fmu['sha256']}" if fmu.get("sha256") else ""
-    return [(_label("FMU", part, labelled), f"{path}{digest}")]
+    digest = f", SHA-256 {part.fmu['sha256']}" if part.fmu.get("sha256") else ""
+    return [(_label("FMU", part, labelled), f"{part.fmu['path']}{digest}")]
 
 
 def _label(text: str, part: Part, labelled: bool) -> str:

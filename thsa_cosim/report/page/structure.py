@@ -13,8 +13,8 @@ from thsa_cosim.report.page.text import count, number_cell, percent, text_cell
 from thsa_cosim.signals import FloatArray
 
 STRUCTURE = "structure.csv"
-#: Panels side by side, and how many are shown at once.
-COLUMNS, CLEAREST = 3, 6
+#: Panels side by side.
+COLUMNS = 3
 
 
 def attribution(part: Part) -> Section | None:
@@ -45,19 +45,22 @@ def attribution(part: Part) -> Section | None:
 def structure(part: Part) -> Section | None:
     """The mean residual over each variable that it may depend on, before and after; None without the table.
 
-    The clearest dependences come first; all of them are under a fold per channel.
+    Each channel's clearest dependence comes first; the others are under a fold per channel.
     """
     path = part.folder / STRUCTURE
     panels = _read(path) if path.is_file() else []
     if not panels:
         return None
-    clearest = sorted(panels, key=lambda panel: -panel.clarity)[:CLEAREST]
+    by_channel: dict[str, list[_Panel]] = {}
+    for panel in sorted(panels, key=lambda panel: -panel.clarity):
+        by_channel.setdefault(panel.channel, []).append(panel)
+    clearest = [own[0] for own in by_channel.values()]
     blocks: list[Block] = [_figure(f"{part.prefix}dependence", clearest)]
-    for k, channel in enumerate(dict.fromkeys(p.channel for p in panels)):
-        own = [p for p in panels if p.channel == channel]
-        if len(panels) > CLEAREST:
-            figure = _figure(f"{part.prefix}dependence-{k}", own)
-            blocks.append(Fold(f"Residual of {channel} over {count(len(own), 'variable')}", (figure,)))
+    for k, (channel, own) in enumerate(by_channel.items()):
+        figure = _figure(f"{part.prefix}dependence-{k}", own)
+        blocks.append(
+            Fold(f"Residual of {channel} over {count(len(own), 'variable')}, the clearest first", (figure,))
+        )
     return Section(f"{part.prefix}structure", "On what the residual depends", tuple(blocks))
 
 

@@ -2,7 +2,7 @@
 
 from thsa_cosim.report.page.comparison import MET, MISSED, noise_ratio, ratio_mark, role_text
 from thsa_cosim.report.page.content import Block, Cell, Column, Facts, Section, Table, Text
-from thsa_cosim.report.page.diagnosis import verdict
+from thsa_cosim.report.page.diagnosis import held_out, verdict
 from thsa_cosim.report.page.failures import evaluations, failed
 from thsa_cosim.report.page.folder import Json, Part, Study
 from thsa_cosim.report.page.gains import term_label
@@ -64,13 +64,7 @@ def _asked(study: Study) -> list[str]:
 def _question(part: Part) -> str:
     """One sentence on what a part was to find."""
     result, about = part.result or {}, part.about
-    fmu = (
-        str(
-            (result.get("declared_fmu") or result.get("fmu") or {}).get("path") or about.get("fmu", "the FMU")
-        )
-        .replace("\\", "/")
-        .rsplit("/", 1)[-1]
-    )
+    fmu = str(part.fmu.get("path") or "the FMU").replace("\\", "/").rsplit("/", 1)[-1]
     names = list(about.get("parameters", {}))
     search = f"differential evolution, {part.population} vectors, at most {part.generations} generations"
     if part.kind == "identify":
@@ -254,7 +248,7 @@ def _sure(study: Study) -> list[str]:
     result = study.whole.result
     if result is None:
         return []
-    sentences = []
+    sentences = [sentence] if (sentence := held_out(result)) else []
     values = [(n, p, e) for p in result.get("points", []) for n, e in p["parameters"].items()]
     if values:
         sentences.append(_determined(values))

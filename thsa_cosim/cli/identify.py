@@ -35,7 +35,8 @@ def identify(options: StudyOptions, export_fmu: bool | None, dry_run: bool) -> N
     from thsa_cosim.scenario import Scenario, load_study
 
     loaded = load_study(options.scenario, **options.overrides)
-    options.check_kind(loaded.kind, "identify")
+    if loaded.kind != "diagnose":  # its parameters can be identified as they are
+        options.check_kind(loaded.kind, "identify")
     if dry_run:
         show_forecast(options, loaded)
         return

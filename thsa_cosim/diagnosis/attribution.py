@@ -21,7 +21,9 @@ from thsa_cosim.signals import FloatArray
 #: An effect must be this many standard errors from nothing, and its held-out gain from chance.
 SIGMAS = 3.0
 #: The share of the structure left that a first and a further effect must explain on the held-out recordings.
-FIRST_SHARE, NEXT_SHARE = 0.15, 0.4
+FIRST_SHARE, NEXT_SHARE = 0.15, 0.2
+#: A further effect must explain this share of what the declared model left, or it may be the first one's misfit.
+TOTAL_SHARE = 0.01
 #: Structure below this many standard deviations of the noise (rms over all channels) is not worth an effect.
 SMALLEST_STRUCTURE = 0.05
 #: Rivals that leave less than this share of the gain unexplained cannot be told apart.
@@ -30,6 +32,9 @@ TIE_SHARE = 0.005
 REFINED, WORTH = 6, 0.03
 #: Once an effect leaves no structure, only those that promise this share of its gain are refined as rivals.
 RIVAL_WORTH = 0.3
+
+#: Mean squared residual, in variances of the noise, above which a fit may have missed the optimum.
+ENOUGH = 1.05
 
 Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
 Say = Callable[[str], None]
@@ -125,7 +130,7 @@ def attribute(
         gains = largest_gains(current, proposals, seed + number)
         limit = threshold(gains)
         scored = _refine_best(bench, current, current_held, proposals, limit, say)
-        choice, reason = _decide(bench, current_held, scored, limit, first=not accepted)
+        choice, reason = _decide(bench, held, current_held, scored, limit, first=not accepted)
         if choice is not None:
             say(f"fitting {choice.candidate.name} with all parameters")
             choice = _polish(bench, choice, current, current_held)
@@ -236,7 +241,7 @@ def _scored(bench: Bench, proposal: Proposal, fit: Fit, current: Fit, held: Floa
 
 
 def _decide(
-    bench: Bench, held: FloatArray, scored: Sequence[Scored], limit: float, *, first: bool
+    bench: Bench, base: FloatArray, held: FloatArray, scored: Sequence[Scored], limit: float, *, first: bool
 ) -> tuple[Scored | None, str]:
     """The effect to accept, or None, and why."""
     if not scored:
@@ -258,17 +263,29 @@ def _decide(
             None,
             f"{best.candidate.name} explains {100 * best.share:.0f} % of what is left, less than {100 * wanted:.0f} %",
         )
+    total = structure(bench.of("validate"), base) / held.size
+    if best.share * left < TOTAL_SHARE * total:
+        return (
+            None,
+            f"{best.candidate.name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left",
+        )
     return best, ""
 
 
 def _polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scored:
-    """The same with every Jacobian column fresh."""
-    fit = refine(
-        bench, choice.fit.unknowns, choice.fit.vector, residual=choice.fit.residual, steps=choice.fit.steps
-    )
-    if fit is None:
+    """The same with every Jacobian column fresh, and once more with the declared parameters from the drawing.
+
+    A missing effect bends the declared parameters; from there an effect that acts by contact may not find its optimum.
+    """
+    unknowns = choice.fit.unknowns
+    drawing = np.where([u.declared for u in unknowns.members], unknowns.start, choice.fit.vector)
+    fits = [refine(bench, unknowns, choice.fit.vector, residual=choice.fit.residual, steps=choice.fit.steps)]
+    if fits[0] is None or fits[0].misfit > ENOUGH * fits[0].residual.size:
+        fits.append(refine(bench, unknowns, drawing))
+    best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)
+    if best is None:
         return choice
-    return _scored(bench, choice.proposal, fit, current, held) or choice
+    return _scored(bench, choice.proposal, best, current, held) or choice
 
 
 def _implausible(choice: Scored) -> str:

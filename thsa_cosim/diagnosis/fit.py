@@ -12,8 +12,9 @@ from thsa_cosim.diagnosis.bench import Bench
 from thsa_cosim.diagnosis.unknowns import Unknowns
 from thsa_cosim.signals import FloatArray
 
-#: A difference step moves the residuals by this much in all (their norm, in standard deviations).
-RESPONSE = 60.0
+#: A difference step moves the residuals by this much in all (their norm, in standard deviations), or by this share of
+#: their own norm: far from the optimum small steps see the solver's events more than the slope.
+RESPONSE, SHARE = 60.0, 0.1
 SMALLEST, LARGEST = 1e-7, 0.3
 
 
@@ -62,14 +63,16 @@ def columns(
     centre: FloatArray,
     which: list[int],
     steps: FloatArray,
+    response: float | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Jacobian columns (N, len(which)) per scale by one-sided differences, and the steps that serve next time.
 
-    A column whose response was far from RESPONSE is taken again with a better step; one that cannot be simulated
-    is zero.
+    A column whose response was far from ``response`` (default: RESPONSE, or SHARE of the residuals' norm) is taken
+    again with a better step; one that cannot be simulated is zero.
     """
     found = np.zeros((centre.size, len(which)))
     steps = steps.copy()
+    aim = max(RESPONSE, SHARE * float(np.linalg.norm(centre))) if response is None else response
     open_ = list(range(len(which)))
     for _ in range(3):
         vectors = np.repeat(vector[None, :], len(open_), axis=0)
@@ -94,8 +97,8 @@ def columns(
             difference = residual - centre
             norm = float(np.linalg.norm(difference))
             found[:, k] = difference / taken[row]
-            wanted = float(np.clip(steps[j] * RESPONSE / max(norm, 1e-12), SMALLEST, LARGEST))
-            if not 0.1 * RESPONSE < norm < 10.0 * RESPONSE and not 0.5 < wanted / steps[j] < 2.0:
+            wanted = float(np.clip(steps[j] * aim / max(norm, 1e-12), SMALLEST, LARGEST))
+            if not 0.1 * aim < norm < 10.0 * aim and not 0.5 < wanted / steps[j] < 2.0:
                 again.append(k)
             steps[j] = wanted
         open_ = again
@@ -131,20 +134,24 @@ def refine(
     renew = list(range(n)) if fresh is None else fresh
     jacobian = np.zeros((residual.size, n)) if jacobian is None else jacobian.copy()
     cost, damping, converged, stale = cost_of(unknowns, vector, residual), 1e-6, False, not jacobian.any()
+    response: float | None = None
     for _ in range(iterations):
         if stale:
-            new, steps = columns(bench, unknowns, vector, residual, renew, steps)
+            new, steps = columns(bench, unknowns, vector, residual, renew, steps, response)
             jacobian[:, renew] = new
         state = Fit(unknowns, vector, residual, jacobian, steps, cost, converged)
         better, promised, damping = _step(bench, state, damping)
         if better is None:
-            converged = promised < enough or not stale
-            if converged or not stale:
+            if promised < enough:
+                converged = True
                 break
+            if response is not None:
+                break
+            response, stale = 5.0 * max(RESPONSE, SHARE * float(np.linalg.norm(residual))), True
             continue
         gained = cost - better.cost
         vector, residual, cost = better.vector, better.residual, better.cost
-        stale = True
+        response, stale = None, True
         if gained < enough:
             converged = True
             break

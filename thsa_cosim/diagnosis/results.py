@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from thsa_cosim.diagnosis.structure import ChannelError
+from thsa_cosim.identify import ForceBalance
 from thsa_cosim.signals import Signals
 
 Verdict = Literal["missing-effect", "no-missing-effect", "unexplained-structure"]
@@ -123,6 +124,8 @@ class DiagnosisResult:
     dependence: tuple[Dependence, ...]
     experiment: SeparatingExperiment | None
     comparisons: tuple[Comparison, ...]
+    force_before: ForceBalance | None
+    force_after: ForceBalance | None
     threshold: float
     evaluations: int
     failures: Mapping[str, int]

@@ -27,12 +27,13 @@ from thsa_cosim.diagnosis.structure import ChannelError, errors, structure
 from thsa_cosim.diagnosis.superset import build_superset, scales_of
 from thsa_cosim.diagnosis.unknowns import Unknowns
 from thsa_cosim.errors import StudyError
-from thsa_cosim.identify import open_study, study_identity
+from thsa_cosim.identify import Comparison as Compared
+from thsa_cosim.identify import ForceBalance, force_balance, open_study, study_identity
 from thsa_cosim.identify.study import describe
 from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
 
 #: More than this share of the structure left after all effects: something else is missing.
-UNEXPLAINED_SHARE = 0.15
+UNEXPLAINED_SHARE = 0.25
 #: Structure (rms in standard deviations of the noise, in some channel) and its significance that count as such.
 VISIBLE, SIGNIFICANT = 0.15, 6.0
 #: The folder of the superset inside a study.
@@ -146,6 +147,8 @@ class _Closing:
             dependence=dependence(scenario, self.trials, before, after),
             experiment=None,
             comparisons=_comparisons(before, after if accepted else None),
+            force_before=_force(scenario, before),
+            force_after=_force(scenario, after) if accepted else None,
             threshold=found.rounds[0].threshold if found.rounds else 0.0,
             evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if accepted else 0),
             failures=counts,
@@ -194,3 +197,24 @@ def _comparisons(before: Identified, after: Identified | None) -> tuple[Comparis
         )
         for t in before.trials
     )
+
+
+def _force(scenario: Scenario, identified: Identified) -> ForceBalance | None:
+    """The force residual of a model on all recordings, if the scenario asks for it."""
+    spec = scenario.force
+    if spec is None:
+        return None
+    fit, compared, masses = identified.fit, [], []
+    for trial in identified.trials:
+        simulated = identified.signals.get(trial.name)
+        if simulated is not None:
+            measured = trial.case.measured
+            compared.append(
+                Compared(trial.case.name, trial.part, None, measured, simulated.resample(measured.time), {})
+            )
+            values = {**trial.case.fixed, **fit.unknowns.assignments(fit.vector, trial.group)}
+            masses.append(values.get(spec.mass, spec.mass_at_start))
+    try:
+        return force_balance(spec, compared, masses)
+    except ValueError:
+        return None  # a recording too short for the band has no force residual

@@ -63,7 +63,8 @@ def identify(
     points = [build_point(scenario, p, known.get(p.temperature_degC)) for p in scenario.points]
     held_out = _held_out_cases(scenario)
     samples = {point.label: point.samples for point in points}
-    open_study(folder, study_identity(scenario), {**describe(scenario, command), "samples": samples})
+    identity = {**study_identity(scenario), "kind": "identify"}
+    open_study(folder, identity, {**describe(scenario, command), "samples": samples})
     names = tuple(dict.fromkeys(name for point in points for name in point.space.names))
     channels = points[0].channel_names
     study = _Study(scenario, points, held_out)

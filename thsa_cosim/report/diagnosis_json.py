@@ -1,6 +1,7 @@
 """A diagnosis as result.json (the contract of the command line) and the files beside it."""
 
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import pandas as pd
 
 from thsa_cosim.diagnosis.results import DiagnosisResult, Errors, Value
 from thsa_cosim.diagnosis.structure import ChannelError
+from thsa_cosim.identify import ForceBalance
 from thsa_cosim.report.result_json import write_json
 from thsa_cosim.report.signal_files import write_signals
 from thsa_cosim.report.study import RESULT
@@ -40,6 +42,9 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
             "before": _values(result.declared_before),
             "after": _values(result.declared_after),
         },
+        "force_residual": None
+        if result.force_before is None
+        else _force(result.force_before, result.force_after),
         "threshold": result.threshold,
         "candidates": [
             {
@@ -55,7 +60,9 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
             }
             for j in result.judged
         ],
-        "not_testable": [{"name": j.variant, "reason": j.reason} for j in result.judged if j.decision == "not testable"],
+        "not_testable": [
+            {"name": j.variant, "reason": j.reason} for j in result.judged if j.decision == "not testable"
+        ],
         "balance": [
             {
                 "equation": b.equation,
@@ -110,6 +117,17 @@ def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:
     files += [p for p in (result.model, result.extended_fmu) if p is not None]
     write_json(folder / RESULT, content)
     return [*files, folder / RESULT]
+
+
+def _force(before: ForceBalance, after: ForceBalance | None) -> dict[str, Any]:
+    laps = before.repeatability
+    return {
+        "unit": before.unit,
+        "band_Hz": before.band,
+        "before": dict(before.rms),
+        "after": {} if after is None else dict(after.rms),
+        "repeatability": None if math.isnan(laps) else laps,
+    }
 
 
 def _values(values: Mapping[str, Value]) -> dict[str, dict[str, Any]]:

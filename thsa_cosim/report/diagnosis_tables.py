@@ -5,7 +5,7 @@ from rich.table import Table
 from rich.text import Text
 
 from thsa_cosim.diagnosis.results import DiagnosisResult
-from thsa_cosim.report.tables import number
+from thsa_cosim.report.tables import force_sentence, number
 
 
 def sentence(result: DiagnosisResult) -> str:
@@ -30,6 +30,9 @@ def print_diagnosis(console: Console, result: DiagnosisResult) -> None:
     if result.effects:
         console.print(_effects(result))
     console.print(_errors(result))
+    for model, force in (("Declared model", result.force_before), ("Extended model", result.force_after)):
+        if force is not None:
+            console.print(Text(f"{model}: {force_sentence(force)}"), highlight=False)
     console.print(_candidates(result))
     for balance in result.balances:
         if balance.at_fault:
@@ -42,7 +45,9 @@ def print_diagnosis(console: Console, result: DiagnosisResult) -> None:
     if result.experiment is not None:
         best = result.experiment
         console.print(
-            Text(f"To tell {best.rivals[0]} from {best.rivals[1]}, run {best.name} (experiment.csv): {best.distance:.3g}")
+            Text(
+                f"To tell {best.rivals[0]} from {best.rivals[1]}, run {best.name} (experiment.csv): {best.distance:.3g}"
+            )
         )
     for note in result.notes:
         console.print(Text(f"note: {note}"), highlight=False)
@@ -80,6 +85,10 @@ def _candidates(result: DiagnosisResult) -> Table:
         table.add_column(heading, justify="right" if "gain" in heading else "left", overflow="fold")
     for one in [j for j in result.judged if j.round == 1][:8]:
         table.add_row(
-            Text(one.variant), number(one.fit_gain, 3), number(one.held_out_gain, 3), one.decision, Text(one.reason)
+            Text(one.variant),
+            number(one.fit_gain, 3),
+            number(one.held_out_gain, 3),
+            one.decision,
+            Text(one.reason),
         )
     return table

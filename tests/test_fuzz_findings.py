@@ -12,7 +12,7 @@ from small_scenario import toml
 
 from thsa_cosim.cli import run_command
 from thsa_cosim.costs import rmse
-from thsa_cosim.recordings import Column, TimeAxis, read_recording
+from thsa_cosim.recordings import Column, TimeAxis, quantum, read_recording
 
 ROOT = Path(__file__).parents[1]
 MOTOR = ROOT / "scenarios" / "motor.toml"
@@ -105,3 +105,7 @@ def test_samples_that_span_next_to_no_time(tmp_path: Path) -> None:
     (tmp_path / "run.csv").write_text("t,v\n0,1\n5e-324,2\n1e-323,3\n")
     recording = read_recording(tmp_path / "run.csv", {"v": Column("v", "m/s")}, time=TimeAxis("t", "s"))
     assert recording.signals.time.size == 3
+
+
+def test_the_quantum_of_values_beyond_single_precision() -> None:
+    assert quantum(1e300 * np.repeat([1.0, 2.0, 3.0, 4.0], 10)) == pytest.approx(1e300)

@@ -24,7 +24,7 @@ def quantum(values: FloatArray) -> float:
         return 0.0
     gaps = np.diff(levels)
     largest = max(abs(float(levels[0])), abs(float(levels[-1])))
-    gaps = gaps[gaps > 64 * np.finfo(np.float32).eps * largest]  # levels split by float32 rounding
+    gaps = gaps[gaps > 64 * float(np.finfo(np.float32).eps) * largest]  # levels split by float32 rounding
     if gaps.size == 0:
         return 0.0
     step = float(np.median(gaps[gaps <= 1.5 * gaps.min()]))

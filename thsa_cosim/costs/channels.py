@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from thsa_cosim.costs.identification import error_terms
+from thsa_cosim.inverse_dynamics import low_pass
 from thsa_cosim.signals import FloatArray, Signals
 
 
@@ -16,7 +17,8 @@ class Channel:
     """One measured signal to be met: samples (n,) at ``time`` (n,) in s, in the FMU variable's unit.
 
     ``noise``: one standard deviation in that unit; ``weight`` multiplies the squared error. The samples
-    outside the cost's window are left out beforehand.
+    outside the cost's window are left out beforehand. ``band``: Hz below which signals are compared, after the same
+    filter without phase shift; ``measured`` has gone through it.
     """
 
     name: str
@@ -24,10 +26,13 @@ class Channel:
     measured: FloatArray
     noise: float
     weight: float = 1.0
+    band: float | None = None
 
     def residual(self, simulated: Signals) -> FloatArray:
         """√weight · (simulated - measured) / noise, (n,); linear between samples where times differ."""
         values = simulated[self.name]
+        if self.band is not None:
+            values = low_pass(values, self.band, float(np.mean(np.diff(simulated.time))))
         if simulated.time.shape != self.time.shape or not np.array_equal(simulated.time, self.time):
             values = np.interp(self.time, simulated.time, values)
         return np.asarray((values - self.measured) * (np.sqrt(self.weight) / self.noise))

@@ -3,15 +3,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from thsa_cosim.batch import Experiment, Reducer
+from thsa_cosim.batch import Experiment, Reducer, Wrapper
 from thsa_cosim.costs import window_mask
 from thsa_cosim.costs.channels import Channel
 from thsa_cosim.errors import ScenarioError
+from thsa_cosim.inverse_dynamics import low_pass
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
+from thsa_cosim.scenario import Channel as ChannelSpec
 from thsa_cosim.scenario import Scenario, TemperaturePoint
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -33,6 +36,7 @@ class Case:
     measured: Signals
     temperature_degC: float | None
     tolerance: float | None
+    wrapper: Wrapper | None = None
 
     def experiment(self, name: str, reduce: Reducer | None) -> Experiment:
         """The simulation under ``name`` with what the worker makes of its signals."""
@@ -45,6 +49,7 @@ class Case:
             fixed=self.fixed,
             tolerance=self.tolerance,
             reduce=reduce,
+            wrapper=self.wrapper,
         )
 
 
@@ -121,14 +126,7 @@ def build_case(scenario: Scenario, recording: Recording, fixed: Mapping[str, flo
             f"{scenario.path}: cost.window and cost.mask leave no sample of {recording.name}; widen them."
         )
     channels = tuple(
-        Channel(
-            name=name,
-            time=time[counted],
-            measured=recording.signals[name][counted],
-            noise=scenario.noise(recording, name),
-            weight=spec.weight,
-        )
-        for name, spec in scenario.cost.channels.items()
+        _channel(scenario, recording, name, spec, counted) for name, spec in scenario.cost.channels.items()
     )
     return Case(
         name=recording.name,
@@ -140,6 +138,35 @@ def build_case(scenario: Scenario, recording: Recording, fixed: Mapping[str, flo
         measured=recording.compared.select(scenario.measured),
         temperature_degC=recording.temperature_degC,
         tolerance=scenario.simulation.tolerance,
+    )
+
+
+def _channel(
+    scenario: Scenario, recording: Recording, name: str, spec: ChannelSpec, counted: np.ndarray[Any, Any]
+) -> Channel:
+    """The samples of a channel that count; within a band every so many, so that they do not repeat each other."""
+    time, measured, every = recording.signals.time, recording.signals[name], 1
+    if spec.band is not None:
+        step = float(np.mean(np.diff(time)))
+        if 2.0 * spec.band * step >= 1.0:
+            raise ScenarioError(
+                f"{scenario.path}: cost.channels.{name}.band = {spec.band:g} Hz is above half the sampling rate of"
+                f" {recording.name}; lower it or leave it out."
+            )
+        try:
+            measured = low_pass(measured, spec.band, step)
+        except ValueError:
+            raise ScenarioError(
+                f"{scenario.path}: {recording.name} is too short for cost.channels.{name}.band; leave it out."
+            ) from None
+        every = max(1, int(1.0 / (2.5 * spec.band * step)))
+    return Channel(
+        name=name,
+        time=time[counted][::every],
+        measured=measured[counted][::every],
+        noise=scenario.noise(recording, name),
+        weight=spec.weight,
+        band=spec.band,
     )
 
 

@@ -256,7 +256,7 @@ def _cost(table: CommonTable, measured: Sequence[str], inputs: Sequence[str]) ->
                 f"{did_you_mean(name, measured)}"
             )
     channels = {
-        name: Channel(c.weight, None if isinstance(c.noise, str) else float(c.noise))
+        name: Channel(c.weight, None if isinstance(c.noise, str) else float(c.noise), c.band)
         for name, c in cost.channels.items()
     } or {name: Channel() for name in measured}
     if isinstance(table, IdentifyTable) and not channels:

@@ -28,10 +28,11 @@ class LawSpec:
 
 @dataclass(frozen=True)
 class Channel:
-    """A compared output; ``noise`` in its FMU unit, None: each recording's own estimate."""
+    """A compared output; ``noise`` in its FMU unit, None: each recording's own estimate; ``band`` in Hz, None: all."""
 
     weight: float = 1.0
     noise: float | None = None
+    band: float | None = None
 
 
 @dataclass(frozen=True)

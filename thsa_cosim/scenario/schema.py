@@ -94,6 +94,17 @@ class ChannelTable(Table):
     noise: float | str = "estimate"
     """Standard deviation of the sensor's noise in the FMU variable's unit, or ``"estimate"``: from the
     recording."""
+    band: Positive | None = None
+    """Hz: compare what is below it, after the same low-pass without phase shift on both sides. ``noise`` is then
+    the noise in that band, as a number."""
+
+    @model_validator(mode="after")
+    def _noise_in_band(self) -> "ChannelTable":
+        if self.band is not None and self.noise == "estimate":
+            raise PydanticCustomError(
+                "band", "band needs noise as a number: the standard deviation in that band"
+            )
+        return self
 
     @field_validator("noise")
     @classmethod

@@ -351,6 +351,7 @@ def test_printing_opens_folds_and_leaves_the_page_as_it_was(show: Show, tmp_path
             folded: document.querySelectorAll('details:not([open])').length,
             empty: [...document.querySelectorAll('.plot')].filter((p) => !p.querySelector('.trace')).length,
             ink: getComputedStyle(document.body).color,
+            widest: Math.max(...[...document.querySelectorAll('.main-svg')].map((svg) => svg.width.baseVal.value)),
           };
         })"""
     )
@@ -358,9 +359,11 @@ def test_printing_opens_folds_and_leaves_the_page_as_it_was(show: Show, tmp_path
     assert pdf.startswith(b"%PDF")
     printed = page.evaluate("window.printed")
     assert (printed["folded"], printed["empty"]) == (0, 0)
+    assert printed["widest"] < 210 / 25.4 * 96  # A4
     assert contrast(printed["ink"], "rgb(255, 255, 255)") > 7.0
     assert len(page.query_selector_all("details:not([open])")) == 1
     assert colours(page) == before
+    assert page.query_selector(".main-svg").bounding_box()["width"] > 1000
 
 
 def test_running_study_shows_how_far_it_is(show: Show, tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
   const root = document.documentElement;
   const figures = JSON.parse(document.getElementById("figures").textContent);
   const drawn = new Set();
+  // CSS pixels that fit on A4 and Letter between usual margins.
+  const PAPER_WIDTH = 680;
 
   // ---- plots: colours are names of the style sheet, looked up when a plot is drawn ----
   const resolve = (value, styles) => {
@@ -35,6 +37,7 @@
     const styles = getComputedStyle(root);
     const figure = resolve(figures[place.id], styles);
     figure.layout.template = { layout: theme(styles) };
+    if (root.classList.contains("printing")) figure.layout.width = PAPER_WIDTH;
     drawn.add(place);
     const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
     return Plotly.react(place, figure.data, figure.layout, options).then(() => { place.dataset.drawn = "yes"; });
@@ -70,7 +73,11 @@
   addEventListener("afterprint", () => {
     root.classList.remove("printing");
     closed.forEach((fold) => { fold.open = false; });
-    drawn.forEach((place) => hidden(place) ? drawn.delete(place) : draw(place));
+    drawn.forEach((place) => {
+      Plotly.purge(place);  // it would keep the paper's width
+      if (hidden(place)) drawn.delete(place);
+      else draw(place);
+    });
   });
 
   // ---- tables sort by a click on a heading; cells without a value stay last ----

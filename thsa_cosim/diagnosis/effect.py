@@ -1,11 +1,19 @@
 """What the catalogue knows of a physical effect, in the terms of the slot that it plugs into."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from thsa_cosim.signals import FloatArray
+
 Role = Literal["coefficient", "shape"]
+Values = Mapping[str, float]
+"""An effect's parameters by name."""
+Connectors = Mapping[str, FloatArray]
+"""The variables that a block reads in its slot (`slots.INPUTS`) over a run, and ``time`` [s]: each (n,)."""
+Law = Callable[[Values, Connectors], FloatArray]
+"""What a block gives, (n,)."""
 
 
 @dataclass(frozen=True)
@@ -82,13 +90,14 @@ class Variant:
 
     ``block`` and ``interface`` are class names within ``THSA.Effects`` and ``THSA.Interfaces`` (or qualified);
     ``slots`` restricts it to slots of these names (without the ending ``Effect``), None: all of the interface.
-    ``injection`` says how a black-box FMU gets it, see `diagnosis.blackbox`.
+    ``law``: the block's equation, for FMUs without source (`diagnosis.blackbox`); None: not for those.
     """
 
     interface: str
     block: str
     parameters: tuple[EffectParameter, ...]
     slots: tuple[str, ...] | None = None
+    law: Law | None = None
 
     @property
     def component(self) -> str:

@@ -1,6 +1,13 @@
 """Friction that differs with the direction of motion."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def asymmetry(p: Values, at: Connectors) -> FloatArray:
+    """dF sgn(v)^2 + db |v|."""
+    return p["dF"] * at["s"] ** 2 + p["db"] * at["v"] * at["s"]
+
 
 EFFECT = Effect(
     name="asymmetric-friction",
@@ -16,6 +23,7 @@ EFFECT = Effect(
                 EffectParameter("dF", "F", 0.01, "half the difference of Coulomb friction"),
                 EffectParameter("db", "F/V", 0.01, "half the difference of the viscous coefficient"),
             ),
+            law=asymmetry,
         ),
     ),
     injection="load",

@@ -1,6 +1,13 @@
 """Clearance between screw and nut."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def offset(p: Values, at: Connectors) -> FloatArray:
+    """-gap/2 on the flank that carries (``side``: 1 where the screw pushes forwards, else -1)."""
+    return -0.5 * p["gap"] * at["side"]
+
 
 EFFECT = Effect(
     name="backlash",
@@ -15,6 +22,7 @@ EFFECT = Effect(
             parameters=(
                 EffectParameter("gap", "m", 2e-05, "clearance, flank to flank", lower=0.0, upper=0.05),
             ),
+            law=offset,
         ),
     ),
     injection="output",

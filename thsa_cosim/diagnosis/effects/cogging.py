@@ -1,6 +1,15 @@
 """Cogging torque of the motor."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+import numpy as np
+
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def torque(p: Values, at: Connectors) -> FloatArray:
+    """a_s sin(n z) + a_c cos(n z)."""
+    return np.asarray(p["a_s"] * np.sin(p["n"] * at["z"]) + p["a_c"] * np.cos(p["n"] * at["z"]))
+
 
 EFFECT = Effect(
     name="cogging",
@@ -28,6 +37,7 @@ EFFECT = Effect(
                 ),
             ),
             slots=("motor",),
+            law=torque,
         ),
     ),
     injection="load",

@@ -1,6 +1,15 @@
 """Offset of the current sensor."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+import numpy as np
+
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def error(p: Values, at: Connectors) -> FloatArray:
+    """o."""
+    return np.full_like(at["u"], p["o"])
+
 
 EFFECT = Effect(
     name="current-sensor-offset",
@@ -14,6 +23,7 @@ EFFECT = Effect(
             block="SensorOffset",
             parameters=(EffectParameter("o", "I", 0.02, "offset"),),
             slots=("currentSensor",),
+            law=error,
         ),
     ),
     injection=None,

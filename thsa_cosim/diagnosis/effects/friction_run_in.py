@@ -1,6 +1,16 @@
 """Friction that falls as the lubricant is worked in."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+import numpy as np
+
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def friction(p: Values, at: Connectors) -> FloatArray:
+    """dF exp(-d/d_r) sgn(v), d the distance travelled."""
+    travelled = np.cumsum(np.abs(np.diff(at["z"], prepend=at["z"][0])))
+    return np.asarray(p["dF"] * np.exp(-travelled / p["d_r"]) * at["s"])
+
 
 EFFECT = Effect(
     name="friction-run-in",
@@ -26,6 +36,7 @@ EFFECT = Effect(
                 ),
             ),
             slots=("screw", "motor", "guide"),
+            law=friction,
         ),
     ),
     injection="load",

@@ -1,6 +1,15 @@
 """Voltage that the inverter's dead time takes."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+import numpy as np
+
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def voltage(p: Values, at: Connectors) -> FloatArray:
+    """-U_d sgn(i_q), a line within +-i_r."""
+    return -p["U_d"] * np.clip(at["i_q"] / p["i_r"], -1.0, 1.0)
+
 
 EFFECT = Effect(
     name="inverter-dead-time",
@@ -25,6 +34,7 @@ EFFECT = Effect(
                     starts=(0.02, 0.2),
                 ),
             ),
+            law=voltage,
         ),
     ),
     injection=None,

@@ -1,6 +1,15 @@
 """Friction in proportion to the load that the pair carries."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+import numpy as np
+
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def friction(p: Values, at: Connectors) -> FloatArray:
+    """mu |N| sgn(v)."""
+    return p["mu"] * np.abs(at["N"]) * at["s"]
+
 
 EFFECT = Effect(
     name="load-dependent-friction",
@@ -13,6 +22,7 @@ EFFECT = Effect(
             interface="FrictionEffect",
             block="LoadDependentFriction",
             parameters=(EffectParameter("mu", "1", 0.01, "friction per load", lower=0.0, upper=0.9),),
+            law=friction,
         ),
     ),
     injection="load",

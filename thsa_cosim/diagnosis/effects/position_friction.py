@@ -1,6 +1,18 @@
 """Friction that varies along the stroke."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+import numpy as np
+
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def friction(p: Values, at: Connectors) -> FloatArray:
+    """(c1 z + c2 exp(-((z - z_2)/w_2)^2 / 2) + c_s sin(kappa z) + c_c cos(kappa z)) sgn(v)."""
+    z = at["z"]
+    rise = p["c2"] * np.exp(-0.5 * ((z - p["z_2"]) / p["w_2"]) ** 2)
+    wave = p["c_s"] * np.sin(p["kappa"] * z) + p["c_c"] * np.cos(p["kappa"] * z)
+    return np.asarray((p["c1"] * z + rise + wave) * at["s"])
+
 
 EFFECT = Effect(
     name="position-friction",
@@ -14,6 +26,7 @@ EFFECT = Effect(
             block="PositionFriction",
             parameters=(EffectParameter("c1", "F/Z", 0.02, "change per length"),),
             slots=("screw", "guide"),
+            law=friction,
         ),
         Variant(
             interface="FrictionEffect",
@@ -35,6 +48,7 @@ EFFECT = Effect(
                 ),
             ),
             slots=("screw", "guide"),
+            law=friction,
         ),
         Variant(
             interface="FrictionEffect",
@@ -54,6 +68,7 @@ EFFECT = Effect(
                 ),
             ),
             slots=("screw", "guide"),
+            law=friction,
         ),
     ),
     injection="load",

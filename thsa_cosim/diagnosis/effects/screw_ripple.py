@@ -1,6 +1,20 @@
 """Ripple of the screw with its angle."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+import numpy as np
+
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def ripple(p: Values, at: Connectors) -> FloatArray:
+    """a_s sin(n z) + a_c cos(n z)."""
+    return np.asarray(p["a_s"] * np.sin(p["n"] * at["z"]) + p["a_c"] * np.cos(p["n"] * at["z"]))
+
+
+def ripple_friction(p: Values, at: Connectors) -> FloatArray:
+    """The same in the direction of motion."""
+    return ripple(p, at) * at["s"]
+
 
 EFFECT = Effect(
     name="screw-ripple",
@@ -28,6 +42,7 @@ EFFECT = Effect(
                 ),
             ),
             slots=("gearbox", "guide"),
+            law=ripple,
         ),
         Variant(
             interface="FrictionEffect",
@@ -48,6 +63,7 @@ EFFECT = Effect(
                 ),
             ),
             slots=("gearbox", "guide"),
+            law=ripple_friction,
         ),
         Variant(
             interface="ContactEffect",

@@ -1,6 +1,15 @@
 """Viscous friction that levels off with speed."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+import numpy as np
+
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def friction(p: Values, at: Connectors) -> FloatArray:
+    """dF (1 - exp(-(v/v_0)^2)) sgn(v)."""
+    return np.asarray(-p["dF"] * np.expm1(-((at["v"] / p["v_0"]) ** 2)) * at["s"])
+
 
 EFFECT = Effect(
     name="shear-thinning",
@@ -25,6 +34,7 @@ EFFECT = Effect(
                     starts=(0.05, 0.15, 0.4),
                 ),
             ),
+            law=friction,
         ),
     ),
     injection="load",

@@ -1,6 +1,15 @@
 """Stribeck friction: breakaway friction that decays as sliding begins."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+import numpy as np
+
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def breakaway(p: Values, at: Connectors) -> FloatArray:
+    """dF exp(-(|v|/v_S)^n) sgn(v)."""
+    return np.asarray(p["dF"] * np.exp(-((np.abs(at["v"]) / p["v_S"]) ** p["n"])) * at["s"])
+
 
 EFFECT = Effect(
     name="stribeck",
@@ -28,6 +37,7 @@ EFFECT = Effect(
                     "n", "1", 2.0, "exponent", role="shape", lower=0.5, upper=3.0, starts=(1.0,), fixed=True
                 ),
             ),
+            law=breakaway,
         ),
     ),
     injection="load",

@@ -1,6 +1,15 @@
 """Torque constant that falls with the current."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+import numpy as np
+
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def fall(p: Values, at: Connectors) -> FloatArray:
+    """-a i^2 - b |i|, relative."""
+    return -p["a"] * at["i_q"] ** 2 - p["b"] * np.abs(at["i_q"])
+
 
 EFFECT = Effect(
     name="torque-constant-saturation",
@@ -13,11 +22,13 @@ EFFECT = Effect(
             interface="TorqueConstantEffect",
             block="TorqueConstantSaturation",
             parameters=(EffectParameter("a", "1/I^2", 0.02, "fall per square of the current", lower=0.0),),
+            law=fall,
         ),
         Variant(
             interface="TorqueConstantEffect",
             block="TorqueConstantSaturation",
             parameters=(EffectParameter("b", "1/I", 0.02, "fall per current", lower=0.0),),
+            law=fall,
         ),
     ),
     injection="load",

@@ -1,6 +1,15 @@
 """Transport delay of the output velocity sensor."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+import numpy as np
+
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def error(p: Values, at: Connectors) -> FloatArray:
+    """u(t - tau) - u(t)."""
+    return np.asarray(np.interp(at["time"] - p["tau"], at["time"], at["u"]) - at["u"])
+
 
 EFFECT = Effect(
     name="velocity-sensor-delay",
@@ -14,6 +23,7 @@ EFFECT = Effect(
             block="SensorDelay",
             parameters=(EffectParameter("tau", "s", 0.002, "delay", lower=1e-05, upper=0.2, neutral=1e-05),),
             slots=("velocitySensor",),
+            law=error,
         ),
     ),
     injection="output",

@@ -1,6 +1,13 @@
 """Gain error of the output velocity sensor."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def error(p: Values, at: Connectors) -> FloatArray:
+    """g u."""
+    return p["g"] * at["u"]
+
 
 EFFECT = Effect(
     name="velocity-sensor-gain",
@@ -14,6 +21,7 @@ EFFECT = Effect(
             block="SensorGain",
             parameters=(EffectParameter("g", "1", 0.01, "relative error", lower=-0.5, upper=0.5),),
             slots=("velocitySensor",),
+            law=error,
         ),
     ),
     injection="output",

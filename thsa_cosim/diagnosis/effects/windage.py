@@ -1,6 +1,13 @@
 """Drag with the square of the motor's speed."""
 
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
+from thsa_cosim.signals import FloatArray
+
+
+def drag(p: Values, at: Connectors) -> FloatArray:
+    """b_q v^2 sgn(v)."""
+    return p["b_q"] * at["v"] ** 2 * at["s"]
+
 
 EFFECT = Effect(
     name="windage",
@@ -14,6 +21,7 @@ EFFECT = Effect(
             block="Windage",
             parameters=(EffectParameter("b_q", "F/V^2", 0.02, "quadratic coefficient", lower=0.0),),
             slots=("motor", "guide"),
+            law=drag,
         ),
     ),
     injection="load",

@@ -1,7 +1,7 @@
 """Which effects the recordings ask for: screen, refine, score on held-out recordings, accept one, and again.
 
-Forward selection (each step against the model so far, declared parameters fitted along), then every accepted effect must
-still be needed beside the others.
+Forward selection (each step against the model so far, declared parameters fitted along), then every accepted
+effect must still be needed beside the others.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -342,7 +342,7 @@ def _prune(
 
 
 def _rivals(bench: Bench, first: Round, base: Fit, held: FloatArray) -> tuple[Scored, ...]:
-    """Other effects than the first accepted one that explain the held-out recordings as well, within the uncertainty."""
+    """Other effects than the first accepted one that explain held-out recordings as well, within the uncertainty."""
     winner = first.accepted
     if winner is None:
         return ()

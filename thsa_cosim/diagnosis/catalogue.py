@@ -18,8 +18,8 @@ def catalogue(folder: Path | None = None) -> dict[str, Effect]:
     found = [
         import_module(f"{effects.__name__}.{m.name}").EFFECT for m in pkgutil.iter_modules(effects.__path__)
     ]
-    for file in sorted(folder.glob("*.py")) if folder is not None else ():
-        found.append(_load(file))
+    if folder is not None:
+        found += [_load(file) for file in sorted(folder.glob("*.py"))]
     return {effect.name: effect for effect in found}
 
 
@@ -27,9 +27,8 @@ def choose(known: dict[str, Effect], names: tuple[str, ...], where: str) -> dict
     """The named effects, or all of them; ScenarioError names ``where`` for one that is unknown."""
     for name in names:
         if name not in known:
-            raise ScenarioError(
-                f"{where}: there is no effect {name!r}.{did_you_mean(name, known) or ' Known: ' + ', '.join(known) + '.'}"
-            )
+            hint = did_you_mean(name, known) or f" Known: {', '.join(known)}."
+            raise ScenarioError(f"{where}: there is no effect {name!r}.{hint}")
     return {name: known[name] for name in names} if names else known
 
 

@@ -1,4 +1,4 @@
-"""The loop closed: the effects in a Modelica class of their own, its FMU, and both models identified and scored alike."""
+"""The loop closed: the effects in a class of their own, its FMU, and both models identified and scored alike."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ def identify_from_drawing(
     workers: int,
     cluster: str | None,
 ) -> Identified:
-    """Identify ``unknowns`` of an FMU on the fit recordings, from the drawing's values and from ``hints``; the best counts.
+    """Identify ``unknowns`` of an FMU on the fit recordings, from the drawing and from ``hints``; the best counts.
 
     StudyError if the FMU cannot be simulated at any start.
     """

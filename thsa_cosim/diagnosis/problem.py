@@ -48,7 +48,8 @@ def trials_of(scenario: Scenario) -> tuple[Trial, ...]:
     for trial in trials:
         if trial.group not in known:
             raise ScenarioError(
-                f"{trial.case.name} was recorded at {trial.group}, where there is no fit recording; add one, or leave it out."
+                f"{trial.case.name} was recorded at {trial.group}, where there is no fit recording; add one, or"
+                " leave it out."
             )
     return tuple(trials)
 
@@ -99,8 +100,8 @@ def _unknown(
     lower, upper = sorted((p.to_variable(p.lower), p.to_variable(p.upper)))
     if not lower < value < upper:
         raise ScenarioError(
-            f"{scenario.path}: parameter {p.name!r} is {p.from_variable(value):.6g} {p.unit} on the drawing, outside its bounds"
-            f" {p.lower:g} to {p.upper:g}; widen them."
+            f"{scenario.path}: parameter {p.name!r} is {p.from_variable(value):.6g} {p.unit} on the drawing,"
+            f" outside its bounds {p.lower:g} to {p.upper:g}; widen them."
         )
     size = spread * (abs(value) or upper - lower)
     return Unknown(

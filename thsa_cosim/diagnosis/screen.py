@@ -124,7 +124,7 @@ def screen(
             difference = residual - base.residual
             norm = float(np.linalg.norm(difference))
             found[r, variable] = np.asarray(difference / step, dtype=np.float32)
-            if not _WANTED / 8 < norm < _WANTED * 8:
+            if not _WANTED / 30 < norm < _WANTED * 30:
                 again.append((r, variable, step * float(np.clip(_WANTED / max(norm, 1e-9), 1e-3, 30.0)), at))
         columns = again
         if not columns:

@@ -21,7 +21,7 @@ EFFECT = Effect(
     title="Ripple of the screw with its angle",
     physics="torque or friction a sin(n phi_g + phase), or a lead error of the same form",
     source="Mei, Tsutsumi, Tao, Sun, Mechanism and Machine Theory 38 (2003); ISO 3408-3 (lead deviation)",
-    signature="periodic in the screw's angle: in the current (torque, friction) or in position against motor angle (lead)",
+    signature="periodic in the screw's angle: in the current (torque, friction) or in position (lead)",
     variants=(
         Variant(
             interface="FrictionEffect",

@@ -33,9 +33,7 @@ EFFECT = Effect(
                     upper=0.3,
                     starts=(0.02, 0.06, 0.2),
                 ),
-                EffectParameter(
-                    "n", "1", 2.0, "exponent", role="shape", lower=0.5, upper=3.0, starts=(1.0,), fixed=True
-                ),
+                EffectParameter("n", "1", 1.5, "exponent", role="shape", lower=0.5, upper=3.0, starts=(1.5,)),
             ),
             law=breakaway,
         ),

@@ -11,6 +11,10 @@ def fall(p: Values, at: Connectors) -> FloatArray:
     return -p["a"] * at["i_q"] ** 2 - p["b"] * np.abs(at["i_q"])
 
 
+BACK_EMF = EffectParameter(
+    "r_e", "1", 1.0, "share of the fall in the back-EMF", role="shape", lower=0.0, upper=1.0, starts=(0.0,)
+)
+
 EFFECT = Effect(
     name="torque-constant-saturation",
     title="Torque constant that falls with the current",
@@ -21,13 +25,19 @@ EFFECT = Effect(
         Variant(
             interface="TorqueConstantEffect",
             block="TorqueConstantSaturation",
-            parameters=(EffectParameter("a", "1/I^2", 0.02, "fall per square of the current", lower=0.0),),
+            parameters=(
+                EffectParameter("a", "1/I^2", 0.02, "fall per square of the current", lower=0.0),
+                BACK_EMF,
+            ),
             law=fall,
         ),
         Variant(
             interface="TorqueConstantEffect",
             block="TorqueConstantSaturation",
-            parameters=(EffectParameter("b", "1/I", 0.02, "fall per current", lower=0.0),),
+            parameters=(
+                EffectParameter("b", "1/I", 0.02, "fall per current", lower=0.0),
+                BACK_EMF,
+            ),
             law=fall,
         ),
     ),

@@ -1,9 +1,10 @@
-"""Write the reference pages that follow from the code: scenario.md from the schema, cli.md from the commands.
+"""Write the reference pages that follow from the code: the scenario file, the commands, the effects.
 
     python docs/generate.py [--check]
 
 ``--check`` changes nothing and ends with exit code 1 if a page is stale. What the pages say stands in the code: in the
-docstrings of the tables' classes and keys (``thsa_cosim/scenario``), and in the commands' help (``thsa_cosim/cli``).
+docstrings of the tables' classes and keys (``thsa_cosim/scenario``), in the commands' help (``thsa_cosim/cli``) and in
+the effects (``thsa_cosim/diagnosis/effects``).
 """
 
 import sys
@@ -12,10 +13,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 
 from cli_page import cli_page
+from effects_page import effects_page
 from scenario_page import scenario_page
 
 DOCS = Path(__file__).parent
-PAGES = {"scenario.md": scenario_page, "cli.md": cli_page}
+PAGES = {"scenario.md": scenario_page, "cli.md": cli_page, "effects.md": effects_page}
 
 
 def main() -> int:

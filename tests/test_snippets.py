@@ -1,8 +1,9 @@
 """Every command and snippet of README, CONTRIBUTING and docs runs, page by page, in a copy of the checkout.
 
-A fenced block ``sh`` is run line by line, the ``python`` blocks of a page as one script. A block ``toml NAME`` is
-written to that file; other ``toml`` blocks are fragments, which must fit into a scenario. What takes long is
-shortened as ``shorten`` says, nothing else is changed, and what cannot run here stands in ``NOT_RUN`` with a reason.
+A fenced block ``sh`` is run line by line, the ``python`` blocks of a page as one script. A block that names a file,
+such as ``toml bench.toml``, is written to that file, and ``toml +bench.toml`` is added to it; other ``toml`` blocks
+are fragments, which must fit into a scenario. What takes long is shortened as ``shorten`` says, nothing else is
+changed, and what cannot run here stands in ``NOT_RUN`` with a reason.
 """
 
 import re
@@ -36,18 +37,32 @@ NOT_RUN = {
     r"DATA_EMPS\.mat": "the data may not be shipped; tests/test_emps.py runs it where they are",
 }
 """Commands, as regular expressions, that are not run, and why."""
-LAST_SECOND = {"motor.toml": 1.1, "driven_check.toml": 1.0, "bench.toml": 1.1}
+LAST_SECOND = {"motor.toml": 1.1, "driven_check.toml": 1.0, "bench.toml": 1.1, "driven.toml": 2.5}
 """s at which the recordings of a scenario are cut."""
+KIND_OF = {"command": "table4", "conditions": "table4", "diagnose": "driven"}
+"""Shipped scenario that a fragment with a table of this name belongs to; else ``motor``."""
+FEWER = {
+    "motor.toml": ["recordings/motor_[mp][25][05].parquet"],
+    "screw.toml": ["recordings/screw_[mp][25][05].parquet"],
+    "gearbox.toml": ["recordings/gearbox_[mp][25][05].parquet"],
+    "driven_check.toml": ["recordings/driven_m30_a.parquet"],
+}
+"""Recordings of a scenario that are left: four temperatures are the least for the laws."""
 INFEASIBLE = "no gains within the bounds keep every hard requirement"
 """How a tuning that was shortened to ten sets of gains may end."""
 
 
 def shorten(name: str, table: dict[str, Any]) -> dict[str, Any]:
-    """Return the scenario ``name`` with a tiny search, short recordings and few conditions."""
+    """Return the scenario ``name`` with a tiny search, few and short recordings, few conditions."""
     if table["kind"] in ("identify", "tune") and "stages" not in table:
         table["search"] = {**table.get("search", {}), "population": 5, "generations": 1}
     if name in LAST_SECOND:
         table["recordings"]["time"]["stop"] = LAST_SECOND[name]
+    if name in FEWER:
+        role = "fit" if table["recordings"].get("fit") else "validate"
+        table["recordings"][role] = FEWER[name]
+    if table["kind"] == "diagnose":
+        table["diagnose"]["effects"] = ["windage"]
     if "surface" in table:
         table["surface"]["points"] = 3
     if "schedule" in table:
@@ -63,6 +78,20 @@ class Block:
     language: str
     info: str
     text: str
+
+    def write(self) -> None:
+        """Write the file that the block names, or add to it."""
+        path = Path(self.info.removeprefix("+"))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if self.language != "toml":
+            path.write_text(self.text, encoding="utf-8")
+            return
+        table = tomllib.loads(self.text)
+        if self.info.startswith("+"):
+            table = merged(tomllib.loads(path.read_text(encoding="utf-8")), table)
+        else:
+            table = shorten(path.name, table)
+        path.write_text(toml(table), encoding="utf-8")
 
 
 def blocks(page: Path) -> list[Block]:
@@ -90,9 +119,10 @@ def name_of(page: Path) -> str:
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of what the snippets use, its scenarios shortened, with a model and a recording of the user's."""
     folder = tmp_path_factory.mktemp("checkout")
-    for name in ("fmus", "modelica", "thsa_cosim"):
+    for name in ("fmus", "thsa_cosim"):
         (folder / name).symlink_to(ROOT / name)
-    shutil.copytree(DOCS, folder / "docs")
+    for name in ("docs", "modelica"):  # to which pages add
+        shutil.copytree(ROOT / name, folder / name)
     (folder / "scenarios").mkdir()
     (folder / "scenarios" / "recordings").symlink_to(ROOT / "scenarios" / "recordings")
     for scenario in (ROOT / "scenarios").glob("*.toml"):
@@ -109,7 +139,7 @@ def already_run() -> set[str]:
 
 
 def pages_with(language: str) -> list[Path]:
-    return [page for page in PAGES if any(block.language == language for block in blocks(page))]
+    return [page for page in PAGES if any(b.language == language and not b.info for b in blocks(page))]
 
 
 @pytest.mark.slow
@@ -123,9 +153,8 @@ def test_commands_run(
 ) -> None:
     monkeypatch.chdir(checkout)
     for block in blocks(page):
-        if block.language == "toml" and block.info:
-            table = shorten(block.info, tomllib.loads(block.text))
-            Path(block.info).write_text(toml(table), encoding="utf-8")
+        if block.info:
+            block.write()
         if block.language != "sh":
             continue
         for command in commands(block):
@@ -149,7 +178,7 @@ def test_commands_run(
 @pytest.mark.parametrize("page", pages_with("python"), ids=name_of)
 def test_python_blocks_run_as_one_script(page: Path, checkout: Path) -> None:
     script = checkout / "snippets.py"
-    parts = [block.text for block in blocks(page) if block.language == "python"]
+    parts = [block.text for block in blocks(page) if block.language == "python" and not block.info]
     if "DATA_EMPS.mat" in "".join(parts):
         pytest.skip(NOT_RUN[r"DATA_EMPS\.mat"])
     script.write_text("\n".join(parts), encoding="utf-8")
@@ -161,16 +190,14 @@ def test_python_blocks_run_as_one_script(page: Path, checkout: Path) -> None:
 
 
 @pytest.mark.parametrize("page", pages_with("toml"), ids=name_of)
-def test_toml_blocks_fit_into_a_scenario(page: Path) -> None:
+def test_fragments_fit_into_a_scenario(page: Path) -> None:
     for block in blocks(page):
-        if block.language != "toml":
-            continue
-        table = tomllib.loads(block.text)
-        if not block.info:
-            base = "table4.toml" if {"command", "conditions"} & table.keys() else "motor.toml"
-            whole = tomllib.loads((ROOT / "scenarios" / base).read_text(encoding="utf-8"))
-            table = merged(whole, table)
-        (TuneTable if table["kind"] == "tune" else KINDS[table["kind"]]).model_validate(table)
+        if block.language == "toml" and not block.info:
+            fragment = tomllib.loads(block.text)
+            kind = next((kind for key, kind in KIND_OF.items() if key in fragment), "motor")
+            base = tomllib.loads((ROOT / "scenarios" / f"{kind}.toml").read_text(encoding="utf-8"))
+            whole = merged(base, fragment)
+            (TuneTable if whole["kind"] == "tune" else KINDS[whole["kind"]]).model_validate(whole)
 
 
 def merged(base: dict[str, Any], fragment: dict[str, Any]) -> dict[str, Any]:

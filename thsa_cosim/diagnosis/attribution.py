@@ -25,7 +25,7 @@ FIRST_SHARE, NEXT_SHARE = 0.15, 0.2
 #: A further effect must explain this share of what the declared model left, or it may be the first one's misfit.
 TOTAL_SHARE = 0.01
 #: Structure below this many standard deviations of the noise (rms over all channels) is not worth an effect.
-SMALLEST_STRUCTURE = 0.05
+SMALLEST_STRUCTURE = 0.08
 #: Rivals that leave less than this share of the gain unexplained cannot be told apart.
 TIE_SHARE = 0.005
 #: How many effects are refined after each screening, if they promise at least this share of the best one's gain.

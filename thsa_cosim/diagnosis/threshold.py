@@ -1,7 +1,7 @@
 """How large a gain chance makes, by a parametric bootstrap of the fitted model.
 
-Noise with the autocorrelation of each channel's residual is drawn over and over; each time the declared parameters are
-fitted (to first order) and every proposal is offered, as in the search. The largest gain of each draw is what a model
+White noise of the sensors' size is drawn over and over; each time the declared parameters are fitted (to first order)
+and every proposal is offered, as in the search. The largest gain of each draw is what a model
 that lacks nothing would show (Efron and Tibshirani, An Introduction to the Bootstrap, chapter 6).
 """
 

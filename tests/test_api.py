@@ -164,6 +164,7 @@ def test_names_of_the_package() -> None:
         "Study",
         "TuneStudy",
         "__version__",
+        "diagnose",
         "identify",
         "open_study",
         "simulate",

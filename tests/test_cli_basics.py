@@ -61,7 +61,7 @@ def test_help_imports_nothing_heavy() -> None:
     ("arguments", "words"),
     [
         (["identfy", "x.toml"], "Did you mean 'identify'?"),
-        (["frobnicate"], "Known commands: export, check, simulate, identify"),
+        (["frobnicate"], "Known commands: export, check, init, simulate, identify"),
         (["identify"], "Missing argument 'SCENARIO'"),
         (["identify", "x.toml", "--workers", "0"], "--workers"),
         (["identify", "x.toml", "--sed", "1"], "--seed"),

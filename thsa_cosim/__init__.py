@@ -1,7 +1,8 @@
 """FMU-based co-simulation toolkit that identifies and tunes electromechanical actuators.
 
-``identify``, ``tune``, ``simulate`` and ``open_study`` are for notebooks and scripts (``thsa_cosim.api``); each is
-imported when it is first used. The rooms below have an ``__init__`` that says what is in them.
+``identify``, ``tune``, ``diagnose``, ``simulate`` and ``open_study`` are for notebooks and scripts
+(``thsa_cosim.api``); each is imported when it is first used. The rooms below say in their ``__init__`` what is in
+them.
 """
 
 import sys
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
         SimulateStudy,
         Study,
         TuneStudy,
+        diagnose,
         identify,
         open_study,
         simulate,
@@ -30,6 +32,7 @@ __all__ = [
     "Study",
     "TuneStudy",
     "__version__",
+    "diagnose",
     "identify",
     "open_study",
     "simulate",

@@ -1,6 +1,6 @@
 """For notebooks and scripts: run a scenario or open a study folder, get tables (pandas) and figures (matplotlib).
 
-``run``      identify, tune, simulate: a scenario in, a study out
+``run``      identify, tune, diagnose, simulate: a scenario in, a study out
 ``study``    what a study folder says, one class a kind
 ``figures``  its plots
 
@@ -8,7 +8,7 @@
 that one that was run elsewhere opens as one that has just been run.
 """
 
-from thsa_cosim.api.run import cores, default_folder, identify, simulate, tune
+from thsa_cosim.api.run import cores, default_folder, diagnose, identify, simulate, tune
 from thsa_cosim.api.study import DiagnoseStudy, IdentifyStudy, SimulateStudy, Study, TuneStudy, open_study
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "TuneStudy",
     "cores",
     "default_folder",
+    "diagnose",
     "identify",
     "open_study",
     "simulate",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from thsa_cosim.api.study import IdentifyStudy, SimulateStudy, Study, TuneStudy, open_study
+from thsa_cosim.api.study import DiagnoseStudy, IdentifyStudy, SimulateStudy, Study, TuneStudy, open_study
 from thsa_cosim.errors import ScenarioError
 
 Recordings = Sequence[Path | str]
@@ -68,10 +68,7 @@ def identify(
 
     path = Path(scenario)
     loaded = load_study(path, fit=fit, validate=validate, seed=seed, fmu=fmu)
-    if loaded.kind != "identify":
-        raise ScenarioError(
-            f"{path} is a scenario of kind {loaded.kind!r}: use {loaded.kind}({str(path)!r})."
-        )
+    _check_kind(path, loaded.kind, "identify")
     place = Path(folder) if folder is not None else default_folder(path)
     processes = workers or cores()
     with ProgressDisplay(console(stderr=True), quiet=quiet) as display:
@@ -112,6 +109,34 @@ def tune(
     return _opened(place, TuneStudy)
 
 
+def diagnose(
+    scenario: Path | str,
+    *,
+    folder: Path | str | None = None,
+    fit: Recordings = (),
+    validate: Recordings = (),
+    seed: int | None = None,
+    fmu: Path | str | None = None,
+    workers: int | None = None,
+    cluster: str | None = None,
+    quiet: bool = False,
+) -> DiagnoseStudy:
+    """Find what the model of ``scenario`` lacks; arguments and errors as of :func:`identify`."""
+    from thsa_cosim.diagnosis import diagnose as run
+    from thsa_cosim.report.diagnosis_json import write_diagnosis
+    from thsa_cosim.report.progress import StepDisplay, console
+    from thsa_cosim.scenario import load_scenario
+
+    path = Path(scenario)
+    loaded = load_scenario(path, fit=fit, validate=validate, seed=seed, fmu=fmu)
+    _check_kind(path, loaded.kind, "diagnose")
+    place = Path(folder) if folder is not None else default_folder(path)
+    with StepDisplay(console(stderr=True), quiet=quiet) as display:
+        found = run(loaded, folder=place, workers=workers or cores(), cluster=cluster, on_progress=display)
+        write_diagnosis(found, place)
+    return _opened(place, DiagnoseStudy)
+
+
 def simulate(
     scenario: Path | str,
     *,
@@ -139,6 +164,11 @@ def simulate(
     claim_folder(place, {**study_identity(loaded), "kind": "simulate"})
     write_simulate(run(loaded, folder=place, workers=workers or cores(), cluster=cluster), place)
     return _opened(place, SimulateStudy)
+
+
+def _check_kind(path: Path, kind: str, wanted: str) -> None:
+    if kind != wanted:
+        raise ScenarioError(f"{path} is a scenario of kind {kind!r}: use {kind}({str(path)!r}).")
 
 
 def _opened(folder: Path, kind: type[S]) -> S:

@@ -1,6 +1,7 @@
 """The command ``demo``: the whole loop on the shipped data, each step as the command that does it."""
 
 import importlib.util
+import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -79,6 +80,7 @@ def _steps(root: Path, output: Path, quick: bool, can_export: bool) -> list[Step
 
     scenarios, recordings = root / "scenarios", root / "scenarios" / "recordings"
     fmu = output / "THSA.fmu" if can_export else root / "fmus" / "THSA.fmu"
+    checked = output / "check.json"
     host = ("--platforms", platform_folders("3.0")[0])
     fit = [w for t in (_FEW if quick else _SOME) for w in ("--fit", str(recordings / f"motor_{t}.parquet"))]
     one = ["--fit", str(recordings / "undeclared_fit_1.parquet")]
@@ -95,8 +97,8 @@ def _steps(root: Path, output: Path, quick: bool, can_export: bool) -> list[Step
         Step(
             "Check what the FMU can be trusted with",
             "Repeated, reset and finer-stepped runs are compared, as they should be with any FMU.",
-            ("check", str(fmu)),
-            list,
+            ("check", str(fmu), "-o", str(checked)),
+            lambda: _checked(checked),
         ),
         Step(
             "Identify the motor from its bench recordings, over temperature",
@@ -138,6 +140,14 @@ def _run(step: Step) -> None:
         )
 
 
+def _checked(file: Path) -> list[str]:
+    content = json.loads(file.read_text(encoding="utf-8"))
+    found = {finding["name"]: finding for finding in content["findings"]}
+    good = sum(finding["verdict"] == "ok" for finding in found.values())
+    told = [f"{n}: {found[n]['text']}" for n in ("communication step", "model exchange") if n in found]
+    return [f"verdict: {content['verdict']}, {good} of {len(found)} trials passed", *told]
+
+
 def _identified(folder: Path) -> list[str]:
     study = open_study(folder)
     assert isinstance(study, IdentifyStudy)
@@ -159,7 +169,10 @@ def _tuned(folder: Path) -> list[str]:
         f"{n} {table['before'][n]:.3g} → {table['value'][n]:.3g} {table['unit'][n]}" for n in table.index
     ]
     shown = ("rise_time", "steady_state_error", "overshoot")
-    change = [f"{n.replace('_', ' ')} {terms['before'][n]:.3g} → {terms['after'][n]:.3g}" for n in shown]
+    units = {n: "" if terms["unit"][n] == "1" else f" {terms['unit'][n]}" for n in shown}
+    change = [
+        f"{n.replace('_', ' ')} {terms['before'][n]:.3g} → {terms['after'][n]:.3g}{units[n]}" for n in shown
+    ]
     return [f"gains: {', '.join(gains)}", f"response: {', '.join(change)}"]
 
 

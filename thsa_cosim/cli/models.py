@@ -39,13 +39,17 @@ def export(
 @click.command()
 @click.argument("fmu", type=PATH)
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
-def check(fmu: Path, as_json: bool) -> None:
+@click.option("-o", "--output", type=PATH, default=None, help="Write the findings as JSON to this file, too.")
+def check(fmu: Path, as_json: bool, output: Path | None) -> None:
     """Say what an FMU is and what it can be trusted with."""
     from thsa_cosim.check import check_fmu
 
     report = check_fmu(fmu)
+    text = json.dumps(report.to_dict(), indent=2)
+    if output is not None:
+        output.write_text(text + "\n", encoding="utf-8")
     if as_json:
-        click.echo(json.dumps(report.to_dict(), indent=2))
+        click.echo(text)
     else:
         from thsa_cosim.report.check import print_check
 

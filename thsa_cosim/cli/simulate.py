@@ -2,7 +2,7 @@
 
 import click
 
-from thsa_cosim.cli.options import StudyOptions, study_options
+from thsa_cosim.cli.options import StudyOptions, console, study_options
 
 
 @click.command()
@@ -10,6 +10,7 @@ from thsa_cosim.cli.options import StudyOptions, study_options
 def simulate(options: StudyOptions) -> None:
     """Run SCENARIO once per recording and compare; parameters to be identified keep their start values."""
     from thsa_cosim.identify import describe, open_study, study_identity
+    from thsa_cosim.report.progress import StepDisplay
     from thsa_cosim.report.study import RESULT, write_simulate
     from thsa_cosim.report.tables import print_simulate
     from thsa_cosim.scenario import load_scenario
@@ -20,6 +21,7 @@ def simulate(options: StudyOptions) -> None:
     folder = place["folder"]
     about = describe(loaded, options.repeat("simulate", folder))
     open_study(folder, {**study_identity(loaded), "kind": "simulate"}, about)
-    result = run(loaded, **place)
+    with StepDisplay(console(stderr=True), quiet=options.quiet) as display:
+        result = run(loaded, **place, on_recording=lambda n, of: display(f"{n} of {of} recordings simulated"))
     files = [*write_simulate(result, folder), *options.page(folder)]
     options.conclude(folder / RESULT, len(files), lambda out: print_simulate(out, result))

@@ -21,31 +21,37 @@ def values_of(fit: Fit, *, declared: bool, inflation: float = 1.0) -> dict[str, 
 
 
 def found_effects(found: Attribution, fit: Fit, inflation: float) -> tuple[FoundEffect, ...]:
-    """The accepted effects with the values of the extended model; variants of one effect in one place are one."""
+    """The accepted effects with the values of the extended model; variants and places of one effect are one."""
     merged: dict[str, list[Scored]] = {}
     for scored in found.accepted:
-        merged.setdefault(scored.candidate.name, []).append(scored)
+        merged.setdefault(scored.candidate.effect.name, []).append(scored)
     values = values_of(fit, declared=False, inflation=inflation)
     rivals = tuple(r.candidate.name for r in found.rivals)
     effects = []
-    for number, (name, members) in enumerate(merged.items()):
+    for number, members in enumerate(merged.values()):
         owner = found.rounds[0] if number == 0 else _round_of(found, members[0])
         chance = owner.probability(members[0].fit_gain)
         effects.append(
             FoundEffect(
-                name=name,
+                name=members[0].candidate.name,
                 title=members[0].candidate.effect.title,
-                parameters={
-                    p.name: values[p.variable]
-                    for s in members
-                    for p in s.candidate.parameters
-                    if p.variable in values
-                },
+                parameters=_parameters(members, values),
                 equivalent=rivals if number == 0 else (),
                 probability=(1.0 - chance) / (1 + len(rivals) if number == 0 else 1),
             )
         )
     return tuple(effects)
+
+
+def _parameters(members: list[Scored], values: Mapping[str, Value]) -> dict[str, Value]:
+    """By name; with the slot and block where an effect acts in several ways."""
+    ways = {s.candidate.component + s.candidate.slot.name for s in members}
+    return {
+        p.name if len(ways) == 1 else p.variable: values[p.variable]
+        for s in members
+        for p in s.candidate.parameters
+        if p.variable in values
+    }
 
 
 def _round_of(found: Attribution, scored: Scored) -> Round:

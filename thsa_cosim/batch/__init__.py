@@ -7,7 +7,7 @@
 ``journal``           the durable table of evaluated vectors
 """
 
-from thsa_cosim.batch.job import Experiment, Job, Reducer
+from thsa_cosim.batch.job import Experiment, Job, PlantRun, Reducer, Wrapper
 from thsa_cosim.batch.journal import Journal, JournalRow, JournalTable, read_journal
 from thsa_cosim.batch.local import LocalRunner
 from thsa_cosim.batch.outcome import Outcome, Status
@@ -21,8 +21,10 @@ __all__ = [
     "JournalTable",
     "LocalRunner",
     "Outcome",
+    "PlantRun",
     "Reducer",
     "Runner",
     "Status",
+    "Wrapper",
     "read_journal",
 ]

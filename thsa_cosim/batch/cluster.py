@@ -22,7 +22,7 @@ from typing import Any, Self
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.local import LocalRunner
 from thsa_cosim.batch.outcome import Outcome, Status
-from thsa_cosim.batch.runner import OnOutcome, check_experiment, check_jobs
+from thsa_cosim.batch.runner import OnOutcome, check_experiment, check_jobs, wrapper_names
 from thsa_cosim.errors import FmuError, MissingExtraError, StudyError
 from thsa_cosim.fmu.description import FmuDescription, read_description
 from thsa_cosim.fmu.scratch import ScratchFolder
@@ -80,6 +80,7 @@ class ClusterRunner:
             raise MissingExtraError("Running on a cluster", "cluster") from None
         self._distributed = distributed
         self._descriptions, self._failures = _describe(experiments)
+        self._wrapped = wrapper_names(experiments)
         self._parcel = _pack(experiments, options)
         try:
             self._client = distributed.Client(address, timeout=timeout_s, set_as_default=False)
@@ -104,7 +105,7 @@ class ClusterRunner:
     def run(self, jobs: Sequence[Job], on_outcome: OnOutcome | None = None) -> list[Outcome]:
         """Run all jobs; see ``Runner.run``."""
         jobs = list(jobs)
-        check_jobs(jobs, self._descriptions)
+        check_jobs(jobs, self._descriptions, self._wrapped)
         outcomes: list[Outcome | None] = [None] * len(jobs)
 
         def finish(index: int, outcome: Outcome) -> None:

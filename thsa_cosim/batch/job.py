@@ -1,13 +1,52 @@
 """What is to be simulated."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 from thsa_cosim.signals import FloatArray, Signals
 
 Reducer = Callable[[Signals], FloatArray]
 """Turns the signals of one run into an array (k,), inside the worker; must be picklable."""
+
+
+class PlantRun(Protocol):
+    """``Plant.run``: one simulation of the FMU itself."""
+
+    def __call__(
+        self,
+        values: Mapping[str, float],
+        inputs: Signals | None,
+        outputs: Sequence[str],
+        time: FloatArray,
+        *,
+        tolerance: float | None = None,
+        once: bool = False,
+    ) -> Signals:
+        """Simulate once; ``once``: these inputs will not come again, so that nothing is kept of them."""
+        ...
+
+
+class Wrapper(Protocol):
+    """Something around an FMU's inputs and outputs that has parameters of its own; must be picklable."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Its own parameters by name, with their start values."""
+        ...
+
+    def run(
+        self,
+        plant_run: PlantRun,
+        values: Mapping[str, float],
+        inputs: Signals | None,
+        outputs: Sequence[str],
+        time: FloatArray,
+        tolerance: float | None,
+    ) -> Signals:
+        """Simulate the FMU inside, as often as it takes; ``values`` are the FMU's and its own."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -28,6 +67,13 @@ class Experiment:
     """Relative solver tolerance; None: the FMU's default."""
     reduce: Reducer | None = None
     """Applied in the worker, so that signals need not travel; see ``Outcome.reduced``."""
+    wrapper: Wrapper | None = None
+    """Runs the FMU in place of a plain simulation; jobs may set its parameters like those of the FMU."""
+
+    @property
+    def wrapper_names(self) -> frozenset[str]:
+        """Names of start values that belong to the wrapper and not to the FMU."""
+        return frozenset(() if self.wrapper is None else self.wrapper.parameters)
 
 
 @dataclass(frozen=True)

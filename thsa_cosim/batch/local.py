@@ -15,7 +15,7 @@ from thsa_cosim.batch.inbox import Inbox, open_inbox
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.process import Progress, WorkerProcess
-from thsa_cosim.batch.runner import OnOutcome, check_jobs
+from thsa_cosim.batch.runner import OnOutcome, check_jobs, wrapper_names
 from thsa_cosim.batch.study import Study
 from thsa_cosim.errors import ParameterError, StudyError
 from thsa_cosim.fmu.plant import Backend, Kind, Reuse
@@ -81,6 +81,7 @@ class LocalRunner:
         if workers < 1:
             raise ParameterError(f"workers is {workers}; it must be at least 1.")
         self._study = Study(experiments)
+        self._wrapped = wrapper_names(experiments)
         self._count = workers
         self._deadline = deadline_s
         self._memory_limit = None if memory_limit_mb is None else int(memory_limit_mb * 2**20)
@@ -117,7 +118,7 @@ class LocalRunner:
         if not self._finalizer.alive:
             raise StudyError("The runner is closed; open a new one.")
         jobs = list(jobs)
-        check_jobs(jobs, self._study.descriptions)
+        check_jobs(jobs, self._study.descriptions, self._wrapped)
         batch = _Batch(jobs, on_outcome)
         try:
             for index, job in enumerate(jobs):

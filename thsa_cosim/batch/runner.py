@@ -44,18 +44,31 @@ def by_name(experiments: Sequence[Experiment]) -> dict[str, Experiment]:
     return named
 
 
+def wrapper_names(experiments: Sequence[Experiment]) -> dict[str, frozenset[str]]:
+    """Names of the wrappers' parameters by experiment, for ``check_jobs``."""
+    return {e.name: e.wrapper_names for e in experiments if e.wrapper is not None}
+
+
 def check_experiment(experiment: Experiment, description: FmuDescription) -> None:
     """FmuError or ParameterError if an experiment names variables that its FMU lacks."""
     from thsa_cosim.fmu.inputs import communication_grid, input_variables
 
-    for name in (*experiment.outputs, *experiment.fixed):
+    own = experiment.wrapper_names
+    for name in (*experiment.outputs, *(n for n in experiment.fixed if n not in own)):
         description.variable(name)
     input_variables(description, experiment.inputs)
     communication_grid(experiment.time)
 
 
-def check_jobs(jobs: Sequence[Job], descriptions: Mapping[str, FmuDescription | None]) -> None:
-    """ParameterError or FmuError for the first job with an unknown experiment or variable."""
+def check_jobs(
+    jobs: Sequence[Job],
+    descriptions: Mapping[str, FmuDescription | None],
+    wrapped: Mapping[str, frozenset[str]] | None = None,
+) -> None:
+    """ParameterError or FmuError for the first job with an unknown experiment or variable.
+
+    ``wrapped``: names that belong to an experiment's wrapper, by experiment.
+    """
     seen: set[tuple[str, tuple[str, ...]]] = set()
     for job in jobs:
         key = (job.experiment, tuple(job.values))
@@ -66,6 +79,8 @@ def check_jobs(jobs: Sequence[Job], descriptions: Mapping[str, FmuDescription | 
             raise ParameterError(f"There is no experiment {job.experiment!r}.{hint}")
         description = descriptions[job.experiment]
         if description is not None:
+            own = (wrapped or {}).get(job.experiment, frozenset())
             for name in job.values:
-                description.variable(name)
+                if name not in own:
+                    description.variable(name)
         seen.add(key)

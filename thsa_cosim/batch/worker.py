@@ -18,6 +18,7 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
 
@@ -144,9 +145,7 @@ class Worker:
             # Deadlines count from here: reading recordings and importing reducers is not the FMU's fault.
             self._progress[BEGAN] = time.monotonic()
             values = {**experiment.fixed, **order.values}
-            signals = plant.run(
-                values, experiment.inputs, experiment.outputs, experiment.time, tolerance=experiment.tolerance
-            )
+            signals = _simulate(experiment, plant, values)
             if experiment.reduce is not None:
                 self._progress[0] = Phase.REDUCE
                 try:
@@ -228,6 +227,14 @@ def read_console(folder: Path, limit: int) -> str:
         more = os.fstat(file.fileno()).st_size - limit
         return text + (f"\n... ({more} bytes cut)" if more > 0 else "")
     return ""
+
+
+def _simulate(experiment: Experiment, plant: Plant, values: Mapping[str, float]) -> Signals:
+    """Run the FMU, inside its wrapper if it has one."""
+    drive = (experiment.inputs, experiment.outputs, experiment.time)
+    if experiment.wrapper is not None:
+        return experiment.wrapper.run(plant.run, values, *drive, experiment.tolerance)
+    return plant.run(values, *drive, tolerance=experiment.tolerance)
 
 
 def _sentence(error: Exception) -> str:

@@ -134,6 +134,7 @@ class Plant:
         time: FloatArray,
         *,
         tolerance: float | None = None,
+        once: bool = False,
     ) -> Signals:
         """Simulate once.
 
@@ -151,6 +152,8 @@ class Plant:
             the first values are those after initialisation with the inputs at ``time[0]``.
         tolerance
             Relative tolerance for the FMU's solver (or, in Model Exchange, ours); ``None``: its default.
+        once
+            These inputs will not come again: nothing prepared for them is kept.
 
         Returns
         -------
@@ -169,7 +172,7 @@ class Plant:
 
             return run_fmi1(self.folder, self.description, values, inputs, outputs, time, self.progress)
         try:
-            result = self._run(values, inputs, outputs, time, tolerance)
+            result = self._run(values, inputs, outputs, time, tolerance, once)
         except BaseException:
             self._free()
             raise
@@ -185,13 +188,15 @@ class Plant:
         outputs: Sequence[str],
         time: FloatArray,
         tolerance: float | None,
+        once: bool,
     ) -> Signals:
         instance = self._instance
         if instance is None:
             self.progress[0] = Phase.LOAD
             instance = self._new_instance()
             self._instance = instance
-        plan = self._plan(instance, inputs, outputs, time)
+        fresh = Plan(instance, inputs, outputs, time) if once else None
+        plan = fresh or self._plan(instance, inputs, outputs, time)
         names = tuple(values)
         settable = self._cached(("values", names), lambda: self._settable(instance, names))
         instance.messages.clear()

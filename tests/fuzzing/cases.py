@@ -2,17 +2,20 @@
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
+import pandas as pd
 from small_scenario import toml
 
 from fuzzing import archives, recordings, scenarios
 from fuzzing.material import SCENARIOS, samples
 from fuzzing.raw import mutate_bytes, mutate_text
 
+DIAGNOSIS = "diagnosis.toml"
+"""Takes so long that it has a kind of its own."""
 COMMANDS = {
     "motor.toml": "identify",
     "check.toml": "simulate",
@@ -36,14 +39,17 @@ class Case:
     @property
     def writes_result(self) -> bool:
         """Whether a success leaves a result.json in the study folder."""
-        return self.arguments[0] in COMMANDS.values()
+        return self.arguments[0] not in ("check", "report")
 
 
-def healthy_cases(material: Path, base: Path) -> list[Case]:
+def healthy_cases(kinds: Collection[str], material: Path, base: Path) -> list[Case]:
     """Make the commands that are mutated, each with healthy input: all must succeed."""
+    if kinds == ("diagnosis",):
+        return [_case("healthy-diagnosis", base, material, "diagnose", DIAGNOSIS)]
+    commands = {**COMMANDS, **({DIAGNOSIS: "diagnose"} if "diagnosis" in kinds else {})}
     cases = [
         _case(f"healthy-{name.removesuffix('.toml')}", base, material, command, name)
-        for name, command in COMMANDS.items()
+        for name, command in commands.items()
     ]
     return [*cases, _case("healthy-fmu", base, material, "check", "Motor.fmu")]
 
@@ -130,9 +136,27 @@ def _study(rng: Random, name: str, material: Path, base: Path) -> Case:
     return case
 
 
+def _diagnosis(rng: Random, name: str, material: Path, base: Path) -> Case:
+    case = _case(name, base, material, "diagnose", DIAGNOSIS)
+    match rng.randrange(6):
+        case 0:
+            driven = pd.read_csv(case.folder / "undeclared_fit_1.csv")
+            path = recordings.write_mutated(rng, case.folder, driven)
+            chosen = (rng.choice(("--fit", "--validate")), str(path.relative_to(case.folder)))
+            return Case(name, case.folder, (*case.arguments, *chosen))
+        case 1:
+            archives.write_mutated(rng, material / "THSA.fmu", case.folder / "mutated.fmu", case.folder)
+            return Case(name, case.folder, (*case.arguments, "--fmu", "mutated.fmu"))
+        case _:
+            table = scenarios.mutate_tables(rng, SCENARIOS[DIAGNOSIS]())
+            (case.folder / DIAGNOSIS).write_text(toml(table), encoding="utf-8")
+            return case
+
+
 KINDS: dict[str, Callable[[Random, str, Path, Path], Case]] = {
     "scenario": _scenario,
     "recording": _recording,
     "fmu": _fmu,
     "study": _study,
+    "diagnosis": _diagnosis,
 }

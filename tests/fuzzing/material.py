@@ -63,7 +63,26 @@ def tuning() -> dict[str, Any]:
     return table
 
 
-SCENARIOS = {"motor.toml": motor, "check.toml": motor_check, "stages.toml": stages, "tuning.toml": tuning}
+def diagnosis() -> dict[str, Any]:
+    """A diagnosis of 1.5 s of the driven actuator that tries two effects."""
+    table = tomllib.loads((SHIPPED / "driven.toml").read_text(encoding="utf-8"))
+    table["fmu"] = "THSA.fmu"
+    table["recordings"] |= {"fit": ["undeclared_fit_1.csv"], "validate": ["undeclared_validate_1.csv"]}
+    table["diagnose"] |= {
+        "package": str(ROOT / "modelica" / "THSA"),
+        "effects": ["windage", "stribeck"],
+        "most": 1,
+    }
+    return table
+
+
+SCENARIOS = {
+    "motor.toml": motor,
+    "check.toml": motor_check,
+    "stages.toml": stages,
+    "tuning.toml": tuning,
+    "diagnosis.toml": diagnosis,
+}
 """Scenario per file name; the command that runs each follows from its kind."""
 
 
@@ -80,6 +99,9 @@ def write_material(folder: Path) -> None:
         shutil.copy(ROOT / "fmus" / fmu, folder / fmu.replace("/", "_"))
     for name in ("motor_m30", "motor_p25"):
         samples(name).to_csv(folder / f"{name}.csv", index=False)
+    for name in ("undeclared_fit_1", "undeclared_validate_1"):
+        driven = pd.read_parquet(SHIPPED / "recordings" / f"{name}.parquet").astype(float)
+        driven.iloc[:1500].round(6).to_csv(folder / f"{name}.csv", index=False)
 
 
 def write_recording(path: Path, frame: pd.DataFrame) -> None:

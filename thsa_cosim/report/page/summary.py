@@ -240,7 +240,7 @@ def _all_errors(study: Study) -> list[tuple[str, str, Json]]:
             key = recording["role"], name
             if key not in worst or error["rmse"] > worst[key]["rmse"]:
                 worst[key] = error
-    return [(f"{role}, worst" if role else "worst", name, error) for (role, name), error in worst.items()]
+    return [(f"{role_text(role)}, worst recording", name, error) for (role, name), error in worst.items()]
 
 
 def _sure(study: Study) -> list[str]:

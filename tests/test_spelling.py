@@ -14,7 +14,9 @@ from typing import Any
 import pytest
 from small_scenario import toml, valid, write_folder
 
+from thsa_cosim.diagnosis.catalogue import catalogue, choose
 from thsa_cosim.errors import InputError
+from thsa_cosim.export.flatten import locate
 from thsa_cosim.scenario import load_study, load_tune
 from thsa_cosim.units import is_unit, same_dimension
 
@@ -103,7 +105,43 @@ def is_still_right(kind: str, path: tuple[str | int, ...], is_key: bool) -> bool
     return path[-1] == "unit" and not is_key and is_unit(typo(word)) and same_dimension(typo(word), word)
 
 
+def diagnose() -> dict[str, Any]:
+    data = small()
+    del data["force"]
+    data["diagnose"] = {
+        "model": "THSA.Actuator",
+        "package": str(ROOT / "modelica" / "THSA"),
+        "effects": ["windage"],
+        "most": 2,
+        "spread": 0.1,
+        "command": "w_cmd",
+        "load": "T_amb",
+        "empirical": False,
+        "balances": [
+            {
+                "name": "mechanical",
+                "unit": "A",
+                "left": "i_q",
+                "terms": ["der(w_m)", "w_m"],
+                "moving": "w_m",
+                "band": 9.0,
+            }
+        ],
+    }
+    data["parameters"][0]["spread"] = 0.1
+    return data | {"kind": "diagnose"}
+
+
+def black_box() -> dict[str, Any]:
+    data = diagnose()
+    for key in ("model", "package"):
+        del data["diagnose"][key]
+    data["diagnose"]["blackbox"] = {"motor_speed": "w_m", "current": "i_q"}
+    return data
+
+
 KINDS = {"identify": small(), "simulate": simulate(), "tune": tune(), "stages": stages()}
+KINDS |= {"diagnose": diagnose(), "black box": black_box()}
 CASES = [
     (kind, *place)
     for kind, data in KINDS.items()
@@ -122,7 +160,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def load(path: Path, kind: str) -> object:
-    return load_tune(path) if kind == "tune" else load_study(path)
+    if kind == "tune":
+        return load_tune(path)
+    scenario = load_study(path)
+    spec = getattr(scenario, "diagnose", None)
+    if spec is not None:  # what the diagnosis itself looks up, before it runs anything
+        choose(catalogue(spec.catalogue), spec.effects, "diagnose.effects")
+        if spec.model is not None:
+            locate(spec.model, spec.package)
+    return scenario
 
 
 def test_every_section_is_misspelt() -> None:
@@ -185,7 +231,7 @@ def test_a_misspelling_gets_the_right_spelling(
 
 
 def equal(meant: str, word: str) -> bool:
-    return meant == word
+    return meant == word or meant in re.findall(r"\w+", word)  # in a formula, the name that is wrong
 
 
 def same_file(meant: str, word: str) -> bool:

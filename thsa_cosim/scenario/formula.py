@@ -100,8 +100,7 @@ def _evaluate(node: ast.expr, values: Mapping[str, FloatArray], step: float) -> 
             inner = _evaluate(operand, values, step)
             return -inner if isinstance(op, ast.USub) else inner
         case ast.Call(func=ast.Name(id=function), args=arguments):
-            inner = [_evaluate(argument, values, step) for argument in arguments]
-            return _call(function, inner, step)
+            return _call(function, [_evaluate(argument, values, step) for argument in arguments], step)
     raise AssertionError(f"{ast.dump(node)} passed the check")
 
 

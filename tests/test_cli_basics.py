@@ -7,7 +7,6 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 import thsa_cosim
 from thsa_cosim import cli
@@ -198,8 +197,3 @@ def test_the_command_to_continue_is_the_one_that_was_given_with_its_folder() -> 
     words = shlex.split(given.repeat("identify", Path("here")))
     fit = ["--fit", "a.csv", "--fit", "b.csv", "--validate", "c.csv"]
     assert words == ["thsa-cosim", "identify", "s.toml", *fit, "--workers", "2", "-o", "here"]
-
-
-def test_shell_completion_is_there() -> None:
-    completed = CliRunner(env={"_THSA_COSIM_COMPLETE": "bash_source"}).invoke(cli.cli, prog_name="thsa-cosim")
-    assert "_thsa_cosim_completion" in completed.output

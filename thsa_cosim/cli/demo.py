@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from thsa_cosim.api import DiagnoseStudy, IdentifyStudy, TuneStudy, open_study
-from thsa_cosim.cli.options import PATH
+from thsa_cosim.cli.options import PATH, console
 from thsa_cosim.errors import InputError, StudyError
 
 _NEEDED = ("scenarios/motor.toml", "scenarios/table4.toml", "scenarios/driven.toml", "modelica/THSA")
@@ -48,26 +48,28 @@ def demo(output: Path, quick: bool) -> None:
     Each step is a command of its own, which is shown with what it found. Takes a few minutes and a checkout of the
     repository; the pages are linked from index.html in the folder.
     """
+    from rich.text import Text
+
     from thsa_cosim.report.index_page import Entry, write_index
 
     root = _checkout()
     can_export = all(importlib.util.find_spec(name) for name in _EXPORTER)
     steps = _steps(root, output, quick, can_export)
     output.mkdir(parents=True, exist_ok=True)
-    begin, entries = time.monotonic(), []
+    out, begin, entries = console(), time.monotonic(), []
     for number, step in enumerate(steps, start=1):
         if step.needs_exporter and not can_export:
             click.echo(
                 f"\n{number}/{len(steps)} {step.title}: left out, it needs pip install 'thsa-cosim[export]'."
             )
             continue
-        click.secho(f"\n{number}/{len(steps)} {step.title}", bold=True)
+        out.print(Text(f"\n{number}/{len(steps)} {step.title}", "bold"), soft_wrap=True)
         click.echo(f"{step.why}\n$ thsa-cosim {' '.join(step.words)}")
         started = time.monotonic()
         _run(step)
         found = step.outcome()
         for sentence in found:
-            click.secho(f"→ {sentence}", bold=True)
+            out.print(Text(f"→ {sentence}", "bold"), soft_wrap=True)
         page = None if step.folder is None else step.folder / "report.html"
         seconds = time.monotonic() - started
         entries.append(Entry(step.title, step.why, step.words, tuple(found), seconds, page))

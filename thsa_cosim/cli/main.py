@@ -11,6 +11,7 @@ import traceback
 import click
 
 from thsa_cosim import __version__
+from thsa_cosim.cli.completion import completion
 from thsa_cosim.cli.demo import demo
 from thsa_cosim.cli.diagnose import diagnose
 from thsa_cosim.cli.identify import identify
@@ -23,7 +24,18 @@ from thsa_cosim.cli.tune import tune
 from thsa_cosim.errors import ThsaCosimError, did_you_mean
 
 #: In the order in which a newcomer meets them; help lists them so.
-COMMANDS: tuple[click.Command, ...] = (export, check, init, simulate, identify, tune, diagnose, report, demo)
+COMMANDS: tuple[click.Command, ...] = (
+    export,
+    check,
+    init,
+    simulate,
+    identify,
+    tune,
+    diagnose,
+    report,
+    demo,
+    completion,
+)
 
 
 class _Cli(click.Group):

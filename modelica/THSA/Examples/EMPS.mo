@@ -18,26 +18,30 @@ model EMPS "Electro-mechanical positioning system: a carriage on a ball screw in
   replaceable THSA.Effects.NoFriction guideEffect(v(unit="m/s"), z(unit="m"), N(unit="N"), F(unit="N"))
     constrainedby THSA.Interfaces.FrictionEffect
     "Slot: friction and forces of guide and screw";
+  THSA.Units.Position s(nominal=1e-2) "Position of the carriage";
+  THSA.Units.Velocity w(nominal=1e-2) "Velocity of the carriage";
   THSA.Units.Force F_m "Motor force on the carriage";
 initial equation
-  q = q_ref;
-  v = 0;
+  s = q_ref;
+  w = 0;
 equation
+  q = s;
+  v = w;
   connect(q_ref, controller.reference);
-  connect(q, controller.q);
-  connect(v, controller.v);
+  controller.q = s;
+  controller.v = w;
   connect(controller.y, vir);
   F = g_tau*vir;
   F_m = g_tau*controller.y_held;
-  friction.v = v;
+  friction.v = w;
   friction.F_C = F_c;
   friction.b_v = F_v;
-  guideEffect.v = v;
+  guideEffect.v = w;
   guideEffect.s = friction.s;
-  guideEffect.z = q;
+  guideEffect.z = s;
   guideEffect.N = F_m;
-  der(q) = v;
-  M*der(v) = F_m - friction.F_f - guideEffect.F - F_0 - F_load;
+  der(s) = w;
+  M*der(w) = F_m - friction.F_f - guideEffect.F - F_0 - F_load;
   annotation(
     experiment(StartTime=0, StopTime=24.84, Tolerance=1e-6, Interval=1e-3),
     Documentation(info="<html>

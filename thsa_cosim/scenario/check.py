@@ -5,12 +5,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from thsa_cosim.errors import ParameterError, ScenarioError, UnitError, did_you_mean
+from thsa_cosim.errors import ParameterError, ScenarioError, UnitError, did_you_mean, did_you_mean_path
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
-from thsa_cosim.scenario.model import BalanceSpec, DiagnoseSpec, ForceSpec
+from thsa_cosim.scenario.formula import parse_formula
+from thsa_cosim.scenario.model import BalanceSpec, BlackBoxSpec, DiagnoseSpec, ForceSpec
 from thsa_cosim.scenario.schema import (
     CommonTable,
+    DiagnoseOptionsTable,
     DiagnoseTable,
     IdentifyTable,
     ParameterTable,
@@ -159,16 +161,17 @@ def diagnosis(
                 f"diagnose.balances[{balance.name}].moving: {balance.moving!r} has no column."
                 f"{did_you_mean(balance.moving, (*inputs, *measured))}"
             )
+        known = (*inputs, *measured, *(p.name for p in table.parameters))
+        for text in (balance.left, *balance.terms):
+            parse_formula(text, known, f"diagnose.balances[{balance.name}]")
     package, own = (
         path.parent / spec.package,
         None if spec.catalogue is None else path.parent / spec.catalogue,
     )
-    if spec.model is not None and not (package / "package.mo").is_file():
-        raise ScenarioError(
-            f"diagnose.package: {package} is no Modelica package (no package.mo); correct the path."
-        )
     if own is not None and not own.is_dir():
-        raise ScenarioError(f"diagnose.catalogue: there is no folder {own}; correct the path.")
+        raise ScenarioError(
+            f"diagnose.catalogue: there is no folder {own}; correct the path.{did_you_mean_path(own)}"
+        )
     return DiagnoseSpec(
         model=spec.model,
         package=package,
@@ -182,7 +185,23 @@ def diagnosis(
         balances=tuple(
             BalanceSpec(b.name, b.unit, b.left, tuple(b.terms), b.moving, b.band) for b in spec.balances
         ),
+        blackbox=_black_box(path, spec, fmu),
     )
+
+
+def _black_box(path: Path, spec: DiagnoseOptionsTable, fmu: FmuDescription) -> BlackBoxSpec | None:
+    """Return the name map of an FMU without source; ScenarioError if it is missing, or names what is no number."""
+    if (spec.model is None) is (spec.blackbox is None):
+        raise ScenarioError(
+            f"{path}: [diagnose] needs either model, the Modelica class that gets the effects, or"
+            " [diagnose.blackbox], the names of an FMU without source."
+        )
+    if spec.blackbox is None:
+        return None
+    names = spec.blackbox.model_dump(exclude_none=True)
+    for key, name in names.items():
+        readable(fmu, name, f"diagnose.blackbox.{key}")
+    return BlackBoxSpec(command=spec.command, load=spec.load, **names)
 
 
 def readable(fmu: FmuDescription, name: str, key: str) -> Variable:

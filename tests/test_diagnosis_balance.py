@@ -97,7 +97,7 @@ def close(folder: Path, data: pd.DataFrame, *balances: dict, start: float = 9e3)
     scenario = load_scenario(path)
     assert scenario.diagnose is not None
     found = close_balances(scenario, scenario.diagnose)
-    return {b.equation.split(":")[0]: b for b in found}
+    return {b.equation: b for b in found}
 
 
 def passing(band: float) -> float:

@@ -78,7 +78,7 @@ def _close(
     excess = (squares / noise_squares - 1.0) / np.sqrt(2.0 / independent)
     share = float(np.clip(1.0 - noise_squares / squares, 0.0, 1.0)) if squares > 0.0 else 0.0
     return Balance(
-        equation=f"{spec.name}: {spec.left} = {' + '.join(f'c{k} {t}' for k, t in enumerate(spec.terms, 1))}",
+        equation=spec.name,
         unit=spec.unit,
         rmse=float(np.sqrt(squares / samples)),
         noise=float(np.sqrt(noise_squares / samples)),

@@ -84,6 +84,14 @@ class SeparatingExperiment:
     inputs: Signals
 
 
+@dataclass(frozen=True)
+class EquivalenceClass:
+    """Candidates that the recordings cannot tell apart, and the smallest principal angle between two of them."""
+
+    names: tuple[str, ...]
+    angle_deg: float
+
+
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """A recording beside both models' outputs."""
@@ -119,9 +127,12 @@ class DiagnosisResult:
     unexplained: float
     model: Path | None
     extended_fmu: Path | None
+    wrapper: Path | None
+    """Of an FMU without source, in place of the two: the effects around it."""
     judged: tuple[Judged, ...]
     balances: tuple[Balance, ...]
     dependence: tuple[Dependence, ...]
+    equivalence: tuple[EquivalenceClass, ...]
     experiment: SeparatingExperiment | None
     comparisons: tuple[Comparison, ...]
     force_before: ForceBalance | None

@@ -10,7 +10,7 @@ from thsa_cosim import __version__
 from thsa_cosim.diagnosis.attribution import Attribution, Scored, attribute
 from thsa_cosim.diagnosis.balance import close_balances
 from thsa_cosim.diagnosis.bench import Bench, Trial
-from thsa_cosim.diagnosis.candidate import candidates_of
+from thsa_cosim.diagnosis.blackbox.prepare import BlackBox, wrap_black_box, write_wrapped
 from thsa_cosim.diagnosis.catalogue import catalogue, choose
 from thsa_cosim.diagnosis.closure import (
     Identified,
@@ -19,12 +19,14 @@ from thsa_cosim.diagnosis.closure import (
     write_extended_model,
 )
 from thsa_cosim.diagnosis.dependence import dependence
+from thsa_cosim.diagnosis.equivalence import equivalence
+from thsa_cosim.diagnosis.experiment import separating_experiment
 from thsa_cosim.diagnosis.judge import found_effects, judged, values_of
-from thsa_cosim.diagnosis.problem import declared_unknowns, spec_of, trials_of, with_fmu
+from thsa_cosim.diagnosis.problem import declared_unknowns, spec_of, trials_of
 from thsa_cosim.diagnosis.results import Comparison, DiagnosisResult, Verdict
 from thsa_cosim.diagnosis.scanning import scanner
 from thsa_cosim.diagnosis.structure import ChannelError, errors, structure
-from thsa_cosim.diagnosis.superset import build_superset, scales_of
+from thsa_cosim.diagnosis.superset import Superset, open_superset
 from thsa_cosim.diagnosis.unknowns import Unknowns
 from thsa_cosim.errors import StudyError
 from thsa_cosim.identify import Comparison as Compared
@@ -69,21 +71,24 @@ def diagnose(
     effects = choose(catalogue(spec.catalogue), spec.effects, f"{scenario.path}: diagnose.effects")
     open_study(folder, study_identity(scenario), describe(scenario, command))
     if spec.model is None:
-        raise StudyError(f"{scenario.path}: diagnose.model is missing.")
-    say("exporting the superset of all effects")
-    fmu, slots, chosen = build_superset(spec.model, spec.package, effects.values(), folder / WORK)
-    own = with_fmu(trials, fmu)
-    fit_cases = [t.case for t in own if t.part == "fit"]
-    scales = scales_of(fmu, slots, fit_cases, scenario.simulation)
-    candidates = candidates_of(chosen, slots, scales)
-    with open_runner(scenario.simulation, [t.experiment for t in own], workers, cluster) as runner:
-        bench = Bench(runner, own)
-        scan = scanner(bench, fmu, slots, scenario.simulation)
-        found = attribute(bench, unknowns, candidates, scan, seed=scenario.seed, most=spec.most, say=say)
+        say("measuring the drive of the black box")
+        tested: Superset | BlackBox = wrap_black_box(scenario, trials, effects.values())
+    else:
+        say("exporting the superset of all effects")
+        tested = open_superset(scenario, spec.model, trials, effects.values(), folder / WORK)
+    with open_runner(scenario.simulation, [t.experiment for t in tested.trials], workers, cluster) as runner:
+        bench = Bench(runner, tested.trials)
+        scan = scanner(bench, tested.slots, tested.signals_at)
+        found = attribute(
+            bench, unknowns, tested.candidates, scan, seed=scenario.seed, most=spec.most, say=say
+        )
     if found is None:
         reason = next(iter(bench.failures), "no run succeeded")
         raise StudyError(f"{scenario.path}: the declared model cannot be simulated: {reason}")
-    return _Closing(scenario, spec, folder, workers, cluster, trials, unknowns, found, bench, say).result()
+    box = tested if isinstance(tested, BlackBox) else None
+    return _Closing(
+        scenario, spec, folder, workers, cluster, trials, unknowns, found, bench, say, box
+    ).result()
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +105,7 @@ class _Closing:
     found: Attribution
     bench: Bench
     say: Say
+    box: BlackBox | None = None
 
     def result(self) -> DiagnosisResult:
         """Identify both models on their own FMUs and judge them."""
@@ -109,16 +115,22 @@ class _Closing:
         accepted, notes, after = found.accepted, list(found.notes), before
         model: Path | None = None
         extended: Path | None = None
+        wrapper: Path | None = None
+        if self.box is not None:
+            notes += self.box.notes
         if accepted:
-            self.say(f"exporting the model with {', '.join(s.candidate.name for s in accepted)}")
-            assert self.spec.model is not None
-            model, extended = write_extended_model(
-                self.folder, self.spec.model, self.spec.package, accepted, found.final
-            )
-            self.say("identifying the extended model from the drawing")
             wider = extended_unknowns(self.unknowns, accepted)
             hint = np.array([found.final.vector[found.final.unknowns.names.index(n)] for n in wider.names])
-            after = self._identify(extended, wider, [hint])
+            if self.box is None:
+                self.say(f"exporting the model with {', '.join(s.candidate.name for s in accepted)}")
+                assert self.spec.model is not None
+                model, extended = write_extended_model(
+                    self.folder, self.spec.model, self.spec.package, accepted, found.final
+                )
+            self.say("identifying the extended model from the drawing")
+            after = self._identify(extended or scenario.fmu.path, wider, [hint], accepted)
+            if self.box is not None:
+                wrapper = write_wrapped(self.folder, self.box, accepted, after.fit)
         share, verdict = self._verdict(before, after, accepted)
         counts = dict(self.bench.failures)
         for identified in (before, after) if accepted else (before,):
@@ -142,10 +154,14 @@ class _Closing:
             unexplained=share,
             model=model,
             extended_fmu=extended,
+            wrapper=wrapper,
             judged=judged(found),
             balances=close_balances(scenario, self.spec),
             dependence=dependence(scenario, self.trials, before, after),
-            experiment=None,
+            equivalence=equivalence(found),
+            experiment=separating_experiment(
+                scenario, self.spec, found, self.bench.trials, self.workers, self.cluster
+            ),
             comparisons=_comparisons(before, after if accepted else None),
             force_before=_force(scenario, before),
             force_after=_force(scenario, after) if accepted else None,
@@ -155,9 +171,12 @@ class _Closing:
             notes=tuple(notes),
         )
 
-    def _identify(self, fmu: Path, unknowns: Unknowns, hints: Sequence[np.ndarray]) -> Identified:
+    def _identify(
+        self, fmu: Path, unknowns: Unknowns, hints: Sequence[np.ndarray], accepted: Sequence[Scored] = ()
+    ) -> Identified:
+        trials = self.trials if self.box is None else self.box.with_effects(accepted)
         return identify_from_drawing(
-            fmu, self.trials, unknowns, hints, self.scenario.simulation, self.workers, self.cluster
+            fmu, trials, unknowns, hints, self.scenario.simulation, self.workers, self.cluster
         )
 
     def _verdict(

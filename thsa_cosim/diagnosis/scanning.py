@@ -1,7 +1,6 @@
 """Starts for wave numbers: what the residual repeats over, slot by slot."""
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -9,8 +8,7 @@ from thsa_cosim.diagnosis.bench import Bench
 from thsa_cosim.diagnosis.fit import Fit
 from thsa_cosim.diagnosis.scan import wave_numbers
 from thsa_cosim.diagnosis.slots import Slot
-from thsa_cosim.diagnosis.superset import slot_signals
-from thsa_cosim.scenario import SimulationSpec
+from thsa_cosim.signals import Signals
 
 #: Periods per revolution that are looked at on a shaft; along a path: periods per largest excursion.
 _HARMONICS = np.arange(1.0, 61.0)
@@ -18,15 +16,20 @@ _PERIODS = np.arange(4.0, 200.0, 0.25)
 
 
 def scanner(
-    bench: Bench, fmu: Path, slots: Sequence[Slot], simulation: SimulationSpec
+    bench: Bench,
+    slots: Sequence[Slot],
+    signals_at: Callable[[Mapping[str, Mapping[str, float]]], Mapping[str, Signals]],
 ) -> Callable[[Fit], Mapping[str, Sequence[float]]]:
-    """Return a function: fit → per friction slot the wave numbers at which its residuals repeat."""
+    """Return a function: fit → per friction slot the wave numbers at which its residuals repeat.
+
+    ``signals_at``: start values by case → ``<slot's component>.z`` of every friction slot by case.
+    """
     chosen = [slot for slot in slots if slot.interface == "FrictionEffect"]
     trials = bench.of("fit")
 
     def scan(fit: Fit) -> Mapping[str, Sequence[float]]:
         values = {t.case.name: fit.unknowns.assignments(fit.vector, t.group) for t in trials}
-        signals = slot_signals(fmu, chosen, [t.case for t in trials], values, simulation)
+        signals = signals_at(values)
         residuals: list[list[np.ndarray]] = []
         place = 0
         for t in trials:

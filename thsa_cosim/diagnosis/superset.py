@@ -4,22 +4,24 @@ One FMU serves the whole search: a candidate is a few start values. At neutral i
 """
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from thsa_cosim.batch import Job, Status
+from thsa_cosim.diagnosis.bench import Trial
 from thsa_cosim.diagnosis.candidate import Candidate, candidates_of
 from thsa_cosim.diagnosis.effect import Effect
 from thsa_cosim.diagnosis.extend import extended_class, write_extended
+from thsa_cosim.diagnosis.problem import with_fmu
 from thsa_cosim.diagnosis.slots import SCALES, Slot, find_slots
 from thsa_cosim.errors import StudyError
 from thsa_cosim.export import export_fmu
 from thsa_cosim.fmu import read_description
 from thsa_cosim.identify.problem import Case
-from thsa_cosim.scenario import SimulationSpec, open_runner
+from thsa_cosim.scenario import Scenario, SimulationSpec, open_runner
 from thsa_cosim.signals import Signals
 
 #: What an FMU for this machine alone is compiled for.
@@ -28,19 +30,35 @@ _HERE = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}
 
 @dataclass(frozen=True, eq=False)
 class Superset:
-    """The FMU with all effects, and the candidates with the scales of this drive on these recordings."""
+    """The recordings driving the FMU with all effects, and the candidates with the scales of this drive.
 
-    fmu: Path
-    model: str
-    package: Path
+    ``signals_at``: start values by case → the inputs of every friction slot by case.
+    """
+
+    trials: tuple[Trial, ...]
     slots: tuple[Slot, ...]
     candidates: tuple[Candidate, ...]
+    signals_at: Callable[[Mapping[str, Mapping[str, float]]], Mapping[str, Signals]]
 
 
 def this_platform() -> tuple[str, ...] | None:
     """What to compile for to run here; None (all) on a machine that is not known."""
     name = _HERE.get(sys.platform)
     return (name,) if name else None
+
+
+def open_superset(
+    scenario: Scenario, model: str, trials: tuple[Trial, ...], effects: Iterable[Effect], folder: Path
+) -> Superset:
+    """Export the superset of ``model`` and measure its scales; StudyError if no recording can be simulated."""
+    assert scenario.diagnose is not None
+    fmu, slots, chosen = build_superset(model, scenario.diagnose.package, effects, folder)
+    own = with_fmu(trials, fmu)
+    cases = [t.case for t in own if t.part == "fit"]
+    candidates = candidates_of(chosen, slots, scales_of(fmu, slots, cases, scenario.simulation))
+    return Superset(
+        own, slots, candidates, lambda values: slot_signals(slots, cases, values, scenario.simulation)
+    )
 
 
 def build_superset(
@@ -113,7 +131,6 @@ def _with_outputs(case: Case, outputs: tuple[str, ...]):  # type: ignore[no-unty
 
 
 def slot_signals(
-    fmu: Path,
     slots: Sequence[Slot],
     cases: Sequence[Case],
     values: Mapping[str, Mapping[str, float]],

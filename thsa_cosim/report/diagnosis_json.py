@@ -38,6 +38,7 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
         "unexplained": result.unexplained,
         "model": None if result.model is None else result.model.name,
         "fmu": None if result.extended_fmu is None else result.extended_fmu.name,
+        "wrapper": None if result.wrapper is None else result.wrapper.name,
         "parameters": {
             "before": _values(result.declared_before),
             "after": _values(result.declared_after),
@@ -74,6 +75,7 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
             }
             for b in result.balances
         ],
+        "equivalence": [{"names": list(c.names), "angle_deg": c.angle_deg} for c in result.equivalence],
         "experiment": None
         if result.experiment is None
         else {
@@ -114,7 +116,7 @@ def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:
         models = {"before": c.before, "after": c.after}
         variants = {"measured": c.measured, **{k: s for k, s in models.items() if s is not None}}
         files.append(write_signals(folder, c.part, c.name, variants))
-    files += [p for p in (result.model, result.extended_fmu) if p is not None]
+    files += [p for p in (result.model, result.extended_fmu, result.wrapper) if p is not None]
     write_json(folder / RESULT, content)
     return [*files, folder / RESULT]
 

@@ -10,6 +10,7 @@ The ``tune_`` modules are the same for tunings, which need no recordings.
 from thsa_cosim.scenario.load import load_scenario
 from thsa_cosim.scenario.model import (
     BalanceSpec,
+    BlackBoxSpec,
     Channel,
     CostSpec,
     DiagnoseSpec,
@@ -29,6 +30,7 @@ from thsa_cosim.scenario.tune_model import TuneScenario
 __all__ = [
     "KINDS",
     "BalanceSpec",
+    "BlackBoxSpec",
     "Channel",
     "CostSpec",
     "DiagnoseSpec",

@@ -75,6 +75,22 @@ class BalanceSpec:
 
 
 @dataclass(frozen=True)
+class BlackBoxSpec:
+    """What an FMU without source calls its signals: inputs ``command`` and ``load``, the others are outputs.
+
+    ``speed`` as its sensor reads it; ``motor_speed`` is what the controller holds. None: there is no such signal.
+    """
+
+    command: str | None = None
+    load: str | None = None
+    speed: str | None = None
+    position: str | None = None
+    motor_speed: str | None = None
+    current: str | None = None
+    voltage: str | None = None
+
+
+@dataclass(frozen=True)
 class DiagnoseSpec:
     """Which model gets effects, which effects are tried, and how far parameters may be off the drawing.
 
@@ -91,6 +107,8 @@ class DiagnoseSpec:
     load: str | None
     empirical: bool
     balances: tuple[BalanceSpec, ...]
+    blackbox: BlackBoxSpec | None = None
+    """Of an FMU without source: ``model`` is None then."""
 
 
 @dataclass(frozen=True)

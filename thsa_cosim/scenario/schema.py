@@ -257,8 +257,9 @@ class IdentifyTable(CommonTable):
 class BalanceTable(Table):
     """``[[diagnose.balances]]``: an equation between measured signals, whose residual says where an effect sits.
 
-    Names are measured signals and inputs; ``der``, ``sgn``, ``abs``, ``max`` and ``min`` are understood. The terms'
-    coefficients are fitted, so that wrong declared parameters do not show.
+    Formulas of measured signals, inputs, numbers and ``[[parameters]]`` (as on the drawing), with + - * / **, ``der``,
+    ``sgn``, ``abs``, ``max`` and ``min``. The terms' coefficients are fitted, so that wrong declared parameters do not
+    show.
     """
 
     name: Name
@@ -275,11 +276,30 @@ class BalanceTable(Table):
     """Hz; both sides are low-passed alike, without phase shift."""
 
 
+class BlackBoxTable(Table):
+    """``[diagnose.blackbox]``: what an FMU without source calls its signals; those that it lacks are left out.
+
+    Effects then act through the load input, through the command, or on outputs.
+    """
+
+    speed: Name | None = None
+    """Output: speed of the load, as its sensor reads it."""
+    position: Name | None = None
+    """Output: position of the load."""
+    motor_speed: Name | None = None
+    """Output: speed that the controller holds, as a rule that of the motor."""
+    current: Name | None = None
+    """Output: current of the motor."""
+    voltage: Name | None = None
+    """Output: voltage of the motor."""
+
+
 class DiagnoseOptionsTable(Table):
     """``[diagnose]``: the model that effects are added to, and which are tried."""
 
     model: Name | None = None
-    """Modelica class with effect slots, such as ``"THSA.Actuator"``; left out: the FMU is a black box."""
+    """Modelica class with effect slots, such as ``"THSA.Actuator"``; left out: the FMU is a black box, and
+    ``[diagnose.blackbox]`` names its signals."""
     package: Name = "../modelica/THSA"
     """Folder of its package, relative to the scenario."""
     effects: list[Name] = Field(default_factory=list)
@@ -297,6 +317,7 @@ class DiagnoseOptionsTable(Table):
     empirical: bool = False
     """Add an empirical law to the model where structure is left that no effect explains."""
     balances: list[BalanceTable] = Field(default_factory=list)
+    blackbox: BlackBoxTable | None = None
 
 
 class DiagnoseParameterTable(ParameterTable):

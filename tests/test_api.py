@@ -104,13 +104,6 @@ def test_a_study_opens_as_it_was(identified: tc.IdentifyStudy) -> None:
     assert "complete" in repr(again)
 
 
-def test_a_second_call_continues_the_study(identified: tc.IdentifyStudy) -> None:
-    again = tc.identify(
-        identified.folder.parent / "screw.toml", folder=identified.folder, workers=1, quiet=True
-    )
-    pd.testing.assert_frame_equal(again.parameters, identified.parameters)
-
-
 def test_tune_gives_gains_and_terms(tmp_path: Path) -> None:
     scenario = shortened("table4.toml", tmp_path, **{"points = 25": "points = 3"})
     study = tc.tune(scenario, folder=tmp_path / "study", workers=2, quiet=True)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from thsa_cosim.errors import MissingExtraError, ModelicaError
+from thsa_cosim.errors import MissingExtraError, ModelicaError, did_you_mean, did_you_mean_path
 
 Expression = dict[str, Any]
 
@@ -127,6 +127,7 @@ def locate(model: str, package: Path) -> tuple[Path, str]:
     if not (package / "package.mo").is_file():
         raise ModelicaError(
             f"{package}: is no Modelica package (no package.mo); give its folder with --package."
+            f"{did_you_mean_path(package)}"
         )
     parts = model.split(".")
     if parts[0] != package.name:
@@ -138,8 +139,6 @@ def locate(model: str, package: Path) -> tuple[Path, str]:
             for path in package.rglob("*.mo")
             if path.name != "package.mo"
         )
-        from thsa_cosim.errors import did_you_mean
-
         raise ModelicaError(f"{package}: holds no class {model!r}.{did_you_mean('.'.join(parts), known)}")
     return file, ".".join(parts)
 

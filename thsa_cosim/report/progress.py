@@ -2,13 +2,14 @@
 
 import time
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, TaskID, TextColumn
 from rich.progress import Progress as Bar
 
-from thsa_cosim.identify.results import Progress
+if TYPE_CHECKING:
+    from thsa_cosim.identify.results import Progress
 
 #: Seconds between two plain lines.
 LINE_EVERY = 10.0
@@ -56,7 +57,7 @@ class ProgressDisplay:
         elif not self._quiet and self._last is not None:
             self._line(self._last)
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: "Progress") -> None:
         """Show ``progress``, unless something was shown a moment ago."""
         now = time.monotonic()
         if self._last is None or progress.stage != self._last.stage:
@@ -76,11 +77,11 @@ class ProgressDisplay:
                 state=self._state(progress),
             )
 
-    def _line(self, progress: Progress) -> None:
+    def _line(self, progress: "Progress") -> None:
         text = f"{progress.stage}: {self._state(progress)}"
         self._console.print(text, highlight=False, markup=False, soft_wrap=True)
 
-    def _state(self, progress: Progress) -> str:
+    def _state(self, progress: "Progress") -> str:
         elapsed = max(time.monotonic() - self._begin, 1e-3)
         rate = (progress.runs - progress.reused) / elapsed
         parts = [f"{progress.runs}/{progress.planned} runs"]

@@ -30,9 +30,9 @@ class Drive:
 
     ``load_sense``: 1 if a positive load opposes positive motion, else -1. ``current_per_force``: current that a
     force at the load costs (current per current where there is no load input). Current = ``proportional`` e +
-    ``integral`` ∫e dt, e = command - motor speed/``ratio``; ``fidelity`` is R² of that. Voltage = ``resistance`` i +
-    ``inductance`` di/dt + ``back_emf`` motor speed. ``coulomb``: friction, as a force at the load. ``rest``,
-    ``motor_rest``: speeds below which the load and the motor stand.
+    ``integral`` ∫e dt, e = command - motor speed/``ratio``, late by ``lag`` [s]; ``fidelity`` is R².
+    Voltage = ``resistance`` i + ``inductance`` di/dt + ``back_emf`` motor speed. ``coulomb``: friction of the whole
+    drive, as a force at the load. ``rest``, ``motor_rest``: speeds below which the load and the motor stand.
     """
 
     load_sense: float = 1.0
@@ -40,6 +40,7 @@ class Drive:
     ratio: float = 1.0
     proportional: float = 0.0
     integral: float = 0.0
+    lag: float = 0.0
     fidelity: float = 0.0
     resistance: float = 0.0
     inductance: float = 0.0
@@ -55,11 +56,12 @@ class Drive:
 
     def command_shift(self, time: FloatArray, current: FloatArray) -> FloatArray:
         """C⁻¹ c: what the command is to be lowered by, (n,), where a torque costs ``current`` (n,)."""
+        ahead = current + self.lag * np.gradient(current, time)
         # trapezoidal rule on equally spaced times: proportional d + integral ∫d dt = current
         even = np.linspace(time[0], time[-1], time.size)
         half = 0.5 * self.integral * (even[1] - even[0])
         feed, back = [1.0, -1.0], [self.proportional + half, half - self.proportional]
-        shift = lfilter(feed, back, np.interp(even, time, current))
+        shift = lfilter(feed, back, np.interp(even, time, ahead))
         return np.asarray(np.interp(time, even, shift))
 
     def voltage(self, time: FloatArray, current: FloatArray) -> FloatArray:
@@ -112,10 +114,12 @@ def _controller(
     if ratio == 0.0:
         return {}
     kept = np.ones(time.size, dtype=bool)
+    # The current loop is late, and lets the back-EMF pull the current off while the speed changes.
+    acceleration, rise = np.gradient(speed, time), np.gradient(current, time)
 
     def regress(r: float) -> tuple[float, FloatArray, FloatArray]:
         error = command - speed / r
-        terms = np.stack([error, integral_of(time, error), np.ones_like(error)], axis=1)
+        terms = np.stack([error, integral_of(time, error), np.ones_like(error), acceleration, rise], axis=1)
         gains = np.asarray(np.linalg.lstsq(terms[kept], current[kept], rcond=None)[0], dtype=np.float64)
         left = current - terms @ gains
         return float(left[kept] @ left[kept]), gains, left
@@ -132,7 +136,13 @@ def _controller(
         _, gains, left = regress(ratio)
         kept = np.abs(left) <= 4.0 * max(float(np.median(np.abs(left[kept]))), 1e-12)
     fidelity = 1.0 - float(np.var(left)) / (float(np.var(current)) or 1.0)
-    return {"ratio": ratio, "proportional": gains[0], "integral": gains[1], "fidelity": fidelity}
+    return {
+        "ratio": ratio,
+        "proportional": gains[0],
+        "integral": gains[1],
+        "lag": max(-gains[4], 0.0),
+        "fidelity": fidelity,
+    }
 
 
 def _load(
@@ -158,7 +168,9 @@ def _load(
         )
     sign = np.sign(speed[moving])
     terms = np.stack([sign, np.maximum(load[moving] * sign, 0.0) * sign, load[moving], speed[moving]], axis=1)
-    coulomb = sense * np.linalg.lstsq(terms, base[spec.current][moving], rcond=None)[0][0] / abs(typical)
+    size = np.linalg.norm(terms, axis=0) + 1e-300
+    gains = np.linalg.lstsq(terms / size, base[spec.current][moving], rcond=1e-6)[0] / size
+    coulomb = sense * gains[0] / abs(typical)
     return {
         "load_sense": float(np.sign(typical)),
         "current_per_force": sense * abs(typical),

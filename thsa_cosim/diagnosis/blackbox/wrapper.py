@@ -26,6 +26,15 @@ PASSES, LOAD_PASSES, DAMPING = 2, 3, 0.7
 CONVERGED = 1e-3
 
 _PLACES = {place.name: place for place in PLACES}
+#: Friction asks for torque, the torque constant turns it into current, the sensor reads that.
+_ORDER = {
+    "FrictionEffect": 0,
+    "TorqueConstantEffect": 1,
+    "SensorEffect": 2,
+    "VoltageEffect": 3,
+    "ContactEffect": 3,
+}
+_IMPLICIT = 12
 
 
 @dataclass(frozen=True)
@@ -108,7 +117,7 @@ class EffectWrapper:
         ways = {_PLACES[t.place].way for t in active}
         passes = LOAD_PASSES if "load" in ways else PASSES if ways & {"command", "reading"} else 0
         for number in range(passes):
-            wanted = self._shifts(active, values, given, self._read(run, shifts))
+            wanted = self._shifts(active, values, given, run, self._read(run, shifts))
             if shifts.is_near(wanted, CONVERGED):
                 break
             shifts = shifts.towards(wanted, DAMPING if number and "load" in ways else 1.0)
@@ -150,25 +159,33 @@ class EffectWrapper:
         return run.with_values(changed)
 
     def _shifts(
-        self, active: Sequence[Term], values: Mapping[str, float], given: Signals, seen: Signals
+        self, active: Sequence[Term], values: Mapping[str, float], given: Signals, run: Signals, seen: Signals
     ) -> _Shifts:
-        load, torque, reading, emf = np.zeros((4, seen.time.size))
-        for term in active:
-            place = _PLACES[term.place]
+        """What the effects ask for along the FMU's own ``run``, which was ``seen`` with the shifts before."""
+        load, torque, reading, emf = np.zeros((4, run.time.size))
+        for term in sorted(active, key=lambda t: _ORDER[_PLACES[t.place].interface]):
+            place, law, own = _PLACES[term.place], self._law(term), term.values(values)
             if place.way == "output":
                 continue
             at = self._connectors(place, given, seen)
-            own = term.values(values)
-            found = self._law(term)(own, at)
-            if place.way == "load":
-                load += self.drive.load_sense * found
-            elif place.way == "reading":
-                reading += found
-            elif place.interface == "FrictionEffect":
-                torque += self.drive.current_per_force * found
-            else:  # the torque constant falls by a share of itself: so much more current is needed
-                torque -= found * at["i_q"]
-                emf += own.get("r_e", 0.0) * found * self.drive.back_emf * at["w_m"]
+            if place.interface == "FrictionEffect":
+                if place.way == "load":
+                    load += self.drive.load_sense * law(own, at)
+                else:
+                    torque += self.drive.current_per_force * law(own, at)
+                continue
+            assert self.signals.current is not None
+            needed = run[self.signals.current] + torque
+            if place.way == "reading":
+                reading += law(own, {**at, "u": needed})
+                continue
+            # the torque constant falls by a share that depends on the current, which grows for it
+            current = needed
+            for _ in range(_IMPLICIT):
+                current = needed - law(own, {**at, "i_q": current}) * current
+            torque += current - needed
+            fall = law(own, {**at, "i_q": current})
+            emf += own.get("r_e", 0.0) * fall * self.drive.back_emf * at["w_m"]
         return _Shifts(load, torque, reading, emf)
 
     def _put_on_outputs(

@@ -181,3 +181,34 @@ def test_identify_gives_the_published_parameters(tmp_path: Path) -> None:
     assert found["M"]["stderr"] < 0.5
     errors = result["error"]
     assert errors["validate"]["F"]["rmse"] < 1.05 * errors["fit"]["F"]["rmse"] < 2.6
+
+
+@needs_data
+@pytest.mark.slow
+def test_diagnose_finds_what_the_symmetric_model_lacks(tmp_path: Path) -> None:
+    scenario, folder = str(ROOT / "scenarios" / "emps.toml"), tmp_path / "study"
+    done = subprocess.run(
+        [sys.executable, "-m", "thsa_cosim.cli", "diagnose", scenario, "--fit", str(DATA), "-o", str(folder)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    result = json.loads((folder / "result.json").read_text())
+    names = [effect["name"].split(":")[0] for effect in result["effects"]]
+    assert names[0] == "asymmetric-friction"
+    assert "stribeck" not in names
+    slope = result["effects"][0]["parameters"]["db"]
+    assert slope["value"] == pytest.approx((166.7061 - 240.4236) / 2, abs=4 * slope["stderr"])
+    force = result["force_residual"]
+    assert force["before"]["validate"] == pytest.approx(2.0, abs=0.1)  # N, lap 4
+    assert force["after"]["validate"] <= 1.0
+    assert force["repeatability"] == pytest.approx(0.27, abs=0.03)
+    assert result["after"]["validate"]["F"]["rmse"] < 0.6 * result["before"]["validate"]["F"]["rmse"]
+    # The extended model is an FMU that runs in closed loop over the whole record.
+    record_time = record()["t"]
+    with Plant.open(folder / result["fmu"]) as plant:
+        drive = Signals(record_time, {"q_ref": record()["qg"], "F_load": 0.0 * record_time})
+        simulated = plant.run({}, drive, ("q", "F"), record_time)
+    settled = slice(300, None)
+    assert rms((simulated["q"] - record()["qm"])[settled]) < 1e-4  # m

@@ -1,8 +1,15 @@
 """The command ``diagnose``."""
 
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 import click
 
 from thsa_cosim.cli.options import StudyOptions, console, study_options
+
+if TYPE_CHECKING:
+    from thsa_cosim.scenario import Scenario
 
 
 @click.command()
@@ -20,7 +27,30 @@ def diagnose(options: StudyOptions) -> None:
     options.check_kind(loaded.kind, "diagnose")
     place = options.place()
     folder = place["folder"]
-    with StepDisplay(console(stderr=True), quiet=options.quiet) as display:
-        result = run(loaded, **place, on_progress=display, command=options.repeat("diagnose", folder))
-    files = [*write_diagnosis(result, folder), *options.page(folder)]
-    options.conclude(folder / RESULT, len(files), lambda out: print_diagnosis(out, result))
+    if not _is_complete(loaded, folder):
+        with StepDisplay(console(stderr=True), quiet=options.quiet) as display:
+            result = run(loaded, **place, on_progress=display, command=options.repeat("diagnose", folder))
+        write_diagnosis(result, folder)
+    options.page(folder)
+    files = sum(path.is_file() for path in folder.rglob("*"))
+    content = _read(folder / RESULT)
+    options.conclude(folder / RESULT, files, lambda out: print_diagnosis(out, content))
+
+
+def _is_complete(scenario: "Scenario", folder: Path) -> bool:
+    """Whether the folder holds this very study with its result; InputError if it holds another one."""
+    from thsa_cosim.identify import open_study, study_identity
+    from thsa_cosim.report.study import RESULT
+
+    if not (folder / RESULT).is_file():
+        return False
+    open_study(folder, study_identity(scenario))
+    try:
+        return _read(folder / RESULT).get("status") == "complete"
+    except (OSError, ValueError, AttributeError):
+        return False  # a damaged result is written anew
+
+
+def _read(path: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return content

@@ -1,5 +1,6 @@
 """``import thsa_cosim as tc``: studies as tables and figures, run here or opened from their folder."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -147,6 +148,33 @@ def test_a_folder_without_a_result_says_so(tmp_path: Path) -> None:
     (tmp_path / "result.json").write_text("[]")
     with pytest.raises(InputError, match="is no result of this version"):
         tc.open_study(tmp_path)
+
+
+def test_a_diagnosis_tells_effects_and_held_out_errors(tmp_path: Path) -> None:
+    errors = {"v": {"rmse": 3e-5, "noise": 2e-5}}
+    found = {
+        "kind": "diagnose",
+        "status": "complete",
+        "verdict": "no-missing-effect",
+        "effects": [],
+        "before": {"fit": {}, "validate": errors},
+        "after": {"fit": {}, "validate": {}},
+    }
+    (tmp_path / "result.json").write_text(json.dumps(found))
+    study = tc.open_study(tmp_path)
+    assert isinstance(study, tc.DiagnoseStudy)
+    assert study.effects.empty
+    assert list(study.effects.columns) == ["value", "stderr", "unit", "probability"]
+    assert study.held_out.loc["v", "before"] == 3e-5
+
+    value = {"value": 6e-6, "stderr": 1e-8, "unit": "N.m.s2/rad2"}
+    effect = {"name": "windage:motor", "probability": 0.99, "parameters": {"b_q": value}}
+    found |= {"effects": [effect], "after": {"fit": {}, "validate": {"v": {"rmse": 2e-5, "noise": 2e-5}}}}
+    (tmp_path / "result.json").write_text(json.dumps(found))
+    study = tc.open_study(tmp_path)
+    assert isinstance(study, tc.DiagnoseStudy)
+    assert study.effects.loc[("windage:motor", "b_q"), "value"] == 6e-6
+    assert study.held_out.loc["v", "after"] == 2e-5
 
 
 def test_names_of_the_package() -> None:

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -73,7 +73,8 @@ class Study:
             for part in self._parts("recordings")
             for signal, error in part["error"].items()
         }
-        return _frame(rows, ["role", "recording", "signal"])
+        columns = ("rmse", "noise", "rmse / noise", "nrmse", "unit")
+        return _frame(rows, ["role", "recording", "signal"], columns)
 
     def signals(self, recording: str) -> "pd.DataFrame":
         """Signals of a recording: index time [s], columns (signal [unit], measured or simulated).
@@ -173,7 +174,7 @@ class IdentifyStudy(Study):
             for point in self.result["points"]
             for name, estimate in point["parameters"].items()
         }
-        return _frame(rows, ["point", "parameter"])
+        return _frame(rows, ["point", "parameter"], wanted)
 
     @property
     def laws(self) -> "pd.DataFrame":
@@ -313,14 +314,14 @@ class DiagnoseStudy(Study):
             for effect in self.result["effects"]
             for name, estimate in effect["parameters"].items()
         }
-        return _frame(rows, ["effect", "parameter"])
+        return _frame(rows, ["effect", "parameter"], ("value", "stderr", "unit", "probability"))
 
     @property
     def held_out(self) -> "pd.DataFrame":
         """Errors of the recordings that no fit touched: index signal; rmse before and after, noise."""
         import pandas as pd
 
-        before, after = (self.result[key].get("validate", {}) for key in ("before", "after"))
+        before, after = ((self.result[key] or {}).get("validate", {}) for key in ("before", "after"))
         rows = {
             signal: {
                 "before": error["rmse"],
@@ -362,11 +363,14 @@ def open_study(folder: Path | str) -> Study:
     return kind(Path(folder), result)
 
 
-def _frame(rows: Mapping[tuple[Any, ...], Any], names: list[str]) -> "pd.DataFrame":
+def _frame(
+    rows: Mapping[tuple[Any, ...], Mapping[str, Any]], names: list[str], columns: Sequence[str]
+) -> "pd.DataFrame":
+    """A table of ``rows`` over an index of ``names``; without rows it has its columns still."""
     import pandas as pd
 
     index = pd.MultiIndex.from_tuples(list(rows) or [("",) * len(names)], names=names)
-    return pd.DataFrame(list(rows.values()), index=index if rows else index[:0])
+    return pd.DataFrame(list(rows.values()), index=index if rows else index[:0], columns=list(columns))
 
 
 def _where(point: Mapping[str, Any]) -> Any:

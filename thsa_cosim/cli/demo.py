@@ -188,11 +188,10 @@ def _diagnosed(folder: Path) -> list[str]:
             effects.index.tolist(), effects["value"], effects["stderr"], effects["unit"], strict=True
         )
     ]
-    left = [
-        f"{n} {errors['before'][n] / errors['noise'][n]:.2f} → {errors['after'][n] / errors['noise'][n]:.2f}"
-        for n in errors.index
-        if errors["noise"][n]
-    ]
+    ratios = {key: errors[key] / errors["noise"] for key in ("before", "after")}
+    if not found:  # nothing was added: there is no after
+        ratios["after"] = ratios["before"]
+    left = [f"{n} {ratios['before'][n]:.2f} → {ratios['after'][n]:.2f}" for n in errors.index]
     return [f"verdict: {study.verdict}", *found, f"held-out errors in units of noise: {', '.join(left)}"]
 
 

@@ -44,7 +44,7 @@ def dependence(
             for k in range(edges.size - 1):
                 inside = index == k
                 count = int(np.count_nonzero(inside))
-                if count < 20:
+                if count < 8:
                     continue
                 last = right[channel][inside]
                 found.append(

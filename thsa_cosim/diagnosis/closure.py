@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from thsa_cosim.diagnosis.attribution import Scored
 from thsa_cosim.diagnosis.bench import Bench, Trial
 from thsa_cosim.diagnosis.extend import extended_class, write_extended
 from thsa_cosim.diagnosis.fit import Fit, cost_of, refine
 from thsa_cosim.diagnosis.problem import with_fmu
+from thsa_cosim.diagnosis.score import Scored
 from thsa_cosim.diagnosis.screen import unknowns_of
 from thsa_cosim.diagnosis.superset import qualified
 from thsa_cosim.diagnosis.unknowns import Unknowns

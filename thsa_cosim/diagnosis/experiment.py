@@ -10,10 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Status
-from thsa_cosim.diagnosis.attribution import Attribution, Scored
+from thsa_cosim.diagnosis.attribution import Attribution
 from thsa_cosim.diagnosis.bench import Trial
 from thsa_cosim.diagnosis.profiles import Profile, input_range, profiles, travel
 from thsa_cosim.diagnosis.results import SeparatingExperiment
+from thsa_cosim.diagnosis.score import Scored
 from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
 from thsa_cosim.signals import FloatArray, Signals
 

@@ -4,9 +4,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from thsa_cosim.diagnosis.attribution import Attribution, Round, Scored
+from thsa_cosim.diagnosis.attribution import Attribution, Round
 from thsa_cosim.diagnosis.fit import Fit
 from thsa_cosim.diagnosis.results import FoundEffect, Judged, Value
+from thsa_cosim.diagnosis.score import Scored
 from thsa_cosim.diagnosis.screen import Proposal
 
 

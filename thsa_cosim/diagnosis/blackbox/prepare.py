@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Status
-from thsa_cosim.diagnosis.attribution import Scored
 from thsa_cosim.diagnosis.bench import Trial
 from thsa_cosim.diagnosis.blackbox.drive import Drive, integral_of, measure_drive
 from thsa_cosim.diagnosis.blackbox.places import WrapperSlot, find_places, fitted_to, slot_of
@@ -16,6 +15,7 @@ from thsa_cosim.diagnosis.blackbox.wrapper import EffectWrapper, Term
 from thsa_cosim.diagnosis.candidate import Candidate, candidates_of
 from thsa_cosim.diagnosis.effect import Effect
 from thsa_cosim.diagnosis.fit import Fit
+from thsa_cosim.diagnosis.score import Scored
 from thsa_cosim.errors import StudyError
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.identify.problem import Case

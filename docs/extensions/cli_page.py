@@ -15,8 +15,8 @@ Every command has `--help`. Bad input ends with one sentence on stderr and exit 
 usable result, with 3; one that was interrupted with 130, and with the command that continues it. A study folder that
 exists is continued, never overwritten. `THSA_COSIM_DEBUG=1` shows the traceback behind a sentence.
 
-Progress goes to stderr: a bar on a terminal, a plain line now and then elsewhere. Results go to stdout, with `--json` as JSON and
-with `--quiet` not at all. Colours are for terminals only, and not where `NO_COLOR` is set.
+Progress goes to stderr: a bar on a terminal, a plain line now and then elsewhere. Results go to stdout, with `--json`
+as JSON and with `--quiet` not at all. Colours are for terminals only, and not where `NO_COLOR` is set.
 """
 
 

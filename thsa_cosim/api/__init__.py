@@ -1,15 +1,16 @@
 """For notebooks and scripts: run a scenario or open a study folder, get tables (pandas) and figures (matplotlib).
 
 ``run``      identify, tune, diagnose, simulate: a scenario in, a study out
-``study``    what a study folder says, one class a kind
+``study``    what every study folder says; ``kinds``: what each kind says besides
 ``figures``  its plots
 
 ``import thsa_cosim as tc`` offers all of it as ``tc.identify(...)`` and so on. A study is read from its folder, so
 that one that was run elsewhere opens as one that has just been run.
 """
 
+from thsa_cosim.api.kinds import DiagnoseStudy, IdentifyStudy, SimulateStudy, TuneStudy, open_study
 from thsa_cosim.api.run import cores, default_folder, diagnose, identify, simulate, tune
-from thsa_cosim.api.study import DiagnoseStudy, IdentifyStudy, SimulateStudy, Study, TuneStudy, open_study
+from thsa_cosim.api.study import Study
 
 __all__ = [
     "DiagnoseStudy",

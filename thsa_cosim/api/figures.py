@@ -14,7 +14,7 @@ from thsa_cosim.report.plots import MEASURED, PUBLISHED, RESIDUAL, SIMULATED
 from thsa_cosim.report.signal_files import SignalFile
 
 if TYPE_CHECKING:
-    from thsa_cosim.api.study import IdentifyStudy, TuneStudy
+    from thsa_cosim.api.kinds import IdentifyStudy, TuneStudy
 
 _COLOURS = {"measured": MEASURED, "command": MEASURED, "simulated": SIMULATED, "before": PUBLISHED}
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from thsa_cosim.api.study import DiagnoseStudy, IdentifyStudy, SimulateStudy, Study, TuneStudy, open_study
+from thsa_cosim.api.kinds import DiagnoseStudy, IdentifyStudy, SimulateStudy, TuneStudy, open_study
+from thsa_cosim.api.study import Study
 from thsa_cosim.errors import ScenarioError
 
 Recordings = Sequence[Path | str]

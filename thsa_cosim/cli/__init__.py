@@ -3,7 +3,8 @@
 ``main``      the group of all commands, errors as one sentence, exit codes
 ``options``   what the study commands share: their options, where a study goes, how it ends
 ``models``    export, check
-``identify``, ``tune``, ``simulate``, ``report``: one module a command
+``dry_run``   what a study command would run, and how long it would take
+``identify``, ``tune``, ``diagnose``, ``simulate``, ``report``, ``init``, ``demo``, ``completion``: one a command
 
 A command imports the heavy rooms itself, when it runs. To add a command: write it in a module of its own and
 name it in ``main.COMMANDS``.

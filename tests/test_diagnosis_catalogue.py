@@ -9,6 +9,7 @@ from thsa_cosim.diagnosis import Effect, EffectParameter, catalogue
 from thsa_cosim.diagnosis.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue import choose
 from thsa_cosim.diagnosis.effect import powers
+from thsa_cosim.diagnosis.empirical import EMPIRICAL
 from thsa_cosim.diagnosis.slots import INPUTS, OUTPUTS, Slot, find_slots
 from thsa_cosim.errors import ModelicaError, ScenarioError
 from thsa_cosim.units import same_dimension
@@ -42,9 +43,10 @@ def slots() -> tuple[Slot, ...]:
 
 def test_every_promised_effect_is_there():
     assert set(PROMISED) <= EFFECTS.keys()
+    assert EMPIRICAL.name not in EFFECTS, "an empirical law is no effect with a name"
 
 
-@pytest.mark.parametrize("effect", EFFECTS.values(), ids=EFFECTS.keys())
+@pytest.mark.parametrize("effect", [*EFFECTS.values(), EMPIRICAL], ids=[*EFFECTS, "empirical"])
 def test_an_effect_says_what_it_is_and_has_its_modelica_class(effect: Effect):
     for text in (effect.title, effect.physics, effect.source, effect.signature):
         assert len(text.split()) > 2

@@ -9,6 +9,7 @@ from reference.rig import Rig, rig_at
 from scipy.optimize import brentq
 
 from thsa_cosim.diagnosis import catalogue
+from thsa_cosim.diagnosis.empirical import EMPIRICAL, LIBRARY
 from thsa_cosim.diagnosis.superset import build_superset
 from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import Signals
@@ -25,7 +26,8 @@ COMMAND = np.interp(TIME, [0.1, 0.3, 0.9, 1.3, 1.7, 1.9], [0.0, SPEED, SPEED, -S
 def superset(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
     pytest.importorskip("rumoca")
     folder = tmp_path_factory.mktemp("superset")
-    fmu, *_ = build_superset("Actuator", ROOT / "modelica" / "THSA", catalogue().values(), folder)
+    effects = [*catalogue().values(), EMPIRICAL]
+    fmu, *_ = build_superset("Actuator", ROOT / "modelica" / "THSA", effects, folder)
     with Plant.open(fmu) as plant:
         yield plant
 
@@ -214,6 +216,34 @@ def test_friction_follows_its_law_of_speed_position_and_load(superset: Plant, bl
     expected = law(quantities)
     assert np.ptp(expected) > 0.0
     np.testing.assert_allclose(quantities["F"], expected, atol=1e-6 * np.ptp(expected))
+
+
+TERMS: dict[str, Law] = {
+    "1": lambda q: np.ones_like(q["v"]),
+    "v |v|": lambda q: q["v"] * np.abs(q["v"]),
+    "v^3": lambda q: q["v"] ** 3,
+    "z": lambda q: q["z"],
+    "z^2": lambda q: q["z"] ** 2,
+    "z sgn(v)": lambda q: q["z"] * q["s"],
+    "z^2 sgn(v)": lambda q: q["z"] ** 2 * q["s"],
+    "z v": lambda q: q["z"] * q["v"],
+    "N": lambda q: q["N"],
+    "|N| sgn(v)": lambda q: np.abs(q["N"]) * q["s"],
+    "|N| v": lambda q: np.abs(q["N"]) * q["v"],
+    "N^2 sgn(v)": lambda q: q["N"] ** 2 * q["s"],
+}
+
+
+@pytest.mark.parametrize("coefficient", LIBRARY)
+def test_a_term_of_the_empirical_law_is_what_its_name_says(superset: Plant, coefficient: str):
+    term = TERMS[LIBRARY[coefficient][0]]
+    names = {q: f"screwEffect.{q}" for q in ("v", "s", "z", "N")}
+    plain = run(superset, {}, tuple(names.values()))
+    size = 200.0 / np.abs(term({q: plain[n] for q, n in names.items()})).max()  # N
+    found = run(superset, {f"screwEffect.empirical.{coefficient}": size}, (*names.values(), "screwEffect.F"))
+    expected = size * term({q: found[n] for q, n in names.items()})
+    # v |v| stands for v v sgn(v), whose sign is a straight line within the friction's own width
+    np.testing.assert_allclose(found["screwEffect.F"], expected, atol=1e-3)
 
 
 def test_run_in_falls_with_the_distance_whatever_the_direction(superset: Plant):

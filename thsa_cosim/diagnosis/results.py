@@ -92,6 +92,24 @@ class EquivalenceClass:
     angle_deg: float
 
 
+@dataclass(frozen=True)
+class EmpiricalTerm:
+    """A term of an empirical law in a slot: v, z, N are the slot's speed, position and load."""
+
+    slot: str
+    term: str
+    coefficient: Value
+
+
+@dataclass(frozen=True)
+class EmpiricalLaw:
+    """What describes the structure that no effect explains; ``held_out_gain`` in variances of the noise."""
+
+    terms: tuple[EmpiricalTerm, ...]
+    held_out_gain: float
+    added: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """A recording beside both models' outputs."""
@@ -132,6 +150,7 @@ class DiagnosisResult:
     judged: tuple[Judged, ...]
     balances: tuple[Balance, ...]
     dependence: tuple[Dependence, ...]
+    empirical: EmpiricalLaw | None
     equivalence: tuple[EquivalenceClass, ...]
     experiment: SeparatingExperiment | None
     comparisons: tuple[Comparison, ...]

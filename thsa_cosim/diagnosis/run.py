@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from thsa_cosim import __version__
-from thsa_cosim.diagnosis.attribution import Attribution, Scored, attribute
+from thsa_cosim.diagnosis.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.balance import close_balances
 from thsa_cosim.diagnosis.bench import Bench, Trial
 from thsa_cosim.diagnosis.blackbox.prepare import BlackBox, wrap_black_box, write_wrapped
@@ -19,12 +19,14 @@ from thsa_cosim.diagnosis.closure import (
     write_extended_model,
 )
 from thsa_cosim.diagnosis.dependence import dependence
+from thsa_cosim.diagnosis.empirical import LawSearch, law_of
 from thsa_cosim.diagnosis.equivalence import equivalence
 from thsa_cosim.diagnosis.experiment import separating_experiment
 from thsa_cosim.diagnosis.judge import found_effects, judged, values_of
 from thsa_cosim.diagnosis.problem import declared_unknowns, spec_of, trials_of
-from thsa_cosim.diagnosis.results import Comparison, DiagnosisResult, Verdict
+from thsa_cosim.diagnosis.results import Comparison, DiagnosisResult, EmpiricalLaw, Verdict
 from thsa_cosim.diagnosis.scanning import scanner
+from thsa_cosim.diagnosis.score import Scored
 from thsa_cosim.diagnosis.structure import ChannelError, errors, structure
 from thsa_cosim.diagnosis.superset import Superset, open_superset
 from thsa_cosim.diagnosis.unknowns import Unknowns
@@ -132,8 +134,21 @@ class _Closing:
             if self.box is not None:
                 wrapper = write_wrapped(self.folder, self.box, accepted, after.fit)
         share, verdict = self._verdict(before, after, accepted)
+        law: EmpiricalLaw | None = None
+        if verdict == "unexplained-structure" and self.box is None:
+            self.say("looking for an empirical law")
+            search = LawSearch(
+                scenario, self.spec, self.trials, self.unknowns, accepted, after, self.folder / WORK,
+                self.workers, self.cluster,
+            )  # fmt: skip
+            terms = search.find()
+            law = None if terms is None else law_of(terms, added=self.spec.empirical)
+            if terms is not None and self.spec.empirical:
+                model, extended, after = self._with_law(terms)
+                share, _ = self._verdict(before, after, accepted)
         counts = dict(self.bench.failures)
-        for identified in (before, after) if accepted else (before,):
+        changed = after is not before
+        for identified in (before, after) if changed else (before,):
             for reason, count in identified.failures.items():
                 counts[reason] = counts.get(reason, 0) + count
         inflation = max(1.0, after.fit.misfit / after.fit.residual.size)
@@ -148,7 +163,7 @@ class _Closing:
             verdict=verdict,
             effects=found_effects(found, after.fit, inflation),
             before=_errors(before),
-            after=_errors(after) if accepted else {"fit": {}, "validate": {}},
+            after=_errors(after) if changed else {"fit": {}, "validate": {}},
             declared_before=values_of(before.fit, declared=True),
             declared_after=values_of(after.fit, declared=True, inflation=inflation),
             unexplained=share,
@@ -158,18 +173,30 @@ class _Closing:
             judged=judged(found),
             balances=close_balances(scenario, self.spec),
             dependence=dependence(scenario, self.trials, before, after),
+            empirical=law,
             equivalence=equivalence(found),
             experiment=separating_experiment(
                 scenario, self.spec, found, self.bench.trials, self.workers, self.cluster
             ),
-            comparisons=_comparisons(before, after if accepted else None),
+            comparisons=_comparisons(before, after if changed else None),
             force_before=_force(scenario, before),
-            force_after=_force(scenario, after) if accepted else None,
+            force_after=_force(scenario, after) if changed else None,
             threshold=found.rounds[0].threshold if found.rounds else 0.0,
-            evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if accepted else 0),
+            evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if changed else 0),
             failures=counts,
             notes=tuple(notes),
         )
+
+    def _with_law(self, terms: Attribution) -> tuple[Path, Path, Identified]:
+        """The model with its effects and an empirical law: class, FMU, identified."""
+        assert self.spec.model is not None
+        added = (*self.found.accepted, *terms.accepted)
+        model, extended = write_extended_model(
+            self.folder, self.spec.model, self.spec.package, added, terms.final
+        )
+        wider = extended_unknowns(self.unknowns, added)
+        hint = np.array([terms.final.vector[terms.final.unknowns.names.index(n)] for n in wider.names])
+        return model, extended, self._identify(extended, wider, [hint], added)
 
     def _identify(
         self, fmu: Path, unknowns: Unknowns, hints: Sequence[np.ndarray], accepted: Sequence[Scored] = ()

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from thsa_cosim.diagnosis.results import DiagnosisResult, Errors, Value
+from thsa_cosim.diagnosis.results import DiagnosisResult, EmpiricalLaw, Errors, Value
 from thsa_cosim.diagnosis.structure import ChannelError
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.report.result_json import write_json
@@ -75,6 +75,7 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
             }
             for b in result.balances
         ],
+        "empirical": None if result.empirical is None else _law(result.empirical),
         "equivalence": [{"names": list(c.names), "angle_deg": c.angle_deg} for c in result.equivalence],
         "experiment": None
         if result.experiment is None
@@ -119,6 +120,24 @@ def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:
     files += [p for p in (result.model, result.extended_fmu, result.wrapper) if p is not None]
     write_json(folder / RESULT, content)
     return [*files, folder / RESULT]
+
+
+def _law(law: EmpiricalLaw) -> dict[str, Any]:
+    return {
+        "slot": law.terms[0].slot,
+        "terms": [
+            {
+                "slot": t.slot,
+                "term": t.term,
+                "coefficient": t.coefficient.value,
+                "unit": t.coefficient.unit,
+                "stderr": t.coefficient.stderr,
+            }
+            for t in law.terms
+        ],
+        "held_out_gain": law.held_out_gain,
+        "added": law.added,
+    }
 
 
 def _force(before: ForceBalance, after: ForceBalance | None) -> dict[str, Any]:

@@ -397,7 +397,7 @@ def test_missing_scenario_file_and_folder(folder):
 
 
 def test_every_kind_has_its_table():
-    assert set(KINDS) == {"identify", "simulate"}
+    assert set(KINDS) == {"diagnose", "identify", "simulate"}
 
 
 def paths(data, prefix=""):

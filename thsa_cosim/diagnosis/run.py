@@ -144,8 +144,8 @@ class _Closing:
             terms = search.find()
             law = None if terms is None else law_of(terms, added=self.spec.empirical)
             if terms is not None and self.spec.empirical:
+                # The share stays that of the effects: a law describes and explains nothing.
                 model, extended, after = self._with_law(terms)
-                share, _ = self._verdict(before, after, accepted)
         counts = dict(self.bench.failures)
         changed = after is not before
         for identified in (before, after) if changed else (before,):

@@ -229,7 +229,7 @@ def test_black_box_needs_names(tmp_path: Path) -> None:
         load_scenario(path)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_command_names_what_the_black_box_lacks(tmp_path: Path) -> None:
     path = tmp_path / "black_box.toml"
     text = scenario_text(most="1", effects='["windage", "velocity-sensor-gain", "current-sensor-offset"]')

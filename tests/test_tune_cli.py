@@ -178,7 +178,7 @@ def test_a_small_schedule_is_written_and_checked_between_its_nodes(tmp_path: Pat
     assert (tmp_path / "study" / "plots" / "schedule_check.png").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_shipped_schedule_holds_everywhere(tmp_path: Path) -> None:
     done = run("tune", SCENARIOS / "schedule.toml", "-o", tmp_path / "study")
     assert done.returncode == 0, done.stderr

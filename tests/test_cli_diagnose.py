@@ -53,8 +53,8 @@ MISTAKES = {
     ),
     "formula": ('"der(i_q)"', '"der(i_qm)"', "'i_qm' in 'der(i_qm)' has no column. Did you mean 'i_q'?"),
     "moving": (
-        'moving = "w_m"',
-        'moving = "w_n"',
+        'moving = ["w_m"',
+        'moving = ["w_n"',
         "diagnose.balances[mechanical].moving: 'w_n' has no column.",
     ),
     "model": ('model = "THSA.Actuator"', 'model = "THSA.Aktuator"', "Aktuator"),

@@ -157,6 +157,11 @@ def test_standstill_and_what_the_filter_smears_of_it_do_not_count(tmp_path: Path
     open_ = {k: v for k, v in MECHANICAL.items() if k != "moving"}
     assert close(tmp_path, held.assign(w_m=speed, i_q=current), open_)["mechanical"].at_fault
     assert masked.rmse < 1.2 * masked.noise
+    # Of several signals every one has to move.
+    both = {**MECHANICAL, "moving": ["u_q", "w_m"]}
+    assert not close(tmp_path, held.assign(w_m=speed, i_q=current), both)["mechanical"].at_fault
+    only = {**MECHANICAL, "moving": ["u_q"]}
+    assert close(tmp_path, held.assign(w_m=speed, i_q=current), only)["mechanical"].at_fault
 
 
 HINGE = {**MECHANICAL, "terms": [*MECHANICAL["terms"], "sgn(w_m)*max(F_load*sgn(w_m) + F_fn, 0)"]}

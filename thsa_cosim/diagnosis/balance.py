@@ -206,20 +206,19 @@ def _record(recording: Recording, spec: BalanceSpec, formulas: tuple[Formula, ..
     reach = int(np.ceil(_REACH / (spec.band * step)))
     if size < 4 * reach or 2.0 * spec.band * step >= 0.9:
         return None
-    names = frozenset().union(*(f.names for f in formulas), {spec.moving} if spec.moving else ())
+    names = frozenset().union(*(f.names for f in formulas), spec.moving)
     even = signals.resample(signals.time[0] + step * np.arange(size))
     values = {name: even[name] for name in names if name in even}
-    kept = _moving(values.get(spec.moving or ""), recording.noise.get(spec.moving or "", 0.0), reach, size)
+    still = np.zeros(size, dtype=bool)
+    still[[0, -1]] = True
+    for name in spec.moving:
+        still |= _standing(values[name], recording.noise.get(name, 0.0))
+    kept = np.convolve(still, np.ones(2 * reach + 1), mode="same") < 0.5
     return _Record(formulas, values, recording.noise, kept, step, spec.band) if kept.any() else None
 
 
-def _moving(
-    speed: FloatArray | None, noise: float, reach: int, size: int
-) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Samples (n,) further than ``reach`` from the ends and from any standstill or change of direction."""
-    still = np.zeros(size, dtype=bool)
-    still[[0, -1]] = True
-    if speed is not None:
-        still |= np.abs(speed) <= _STANDING * noise
-        still[1:] |= np.sign(speed[1:]) != np.sign(speed[:-1])
-    return np.convolve(still, np.ones(2 * reach + 1), mode="same") < 0.5
+def _standing(speed: FloatArray, noise: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Samples (n,) of a speed that may be zero, or where it changes its direction."""
+    still = np.abs(speed) <= _STANDING * noise
+    still[1:] |= np.sign(speed[1:]) != np.sign(speed[:-1])
+    return np.asarray(still)

@@ -156,11 +156,12 @@ def diagnosis(
                 f"diagnose.{key}: {name!r} is no input with a column.{did_you_mean(name, inputs)}"
             )
     for balance in spec.balances:
-        if balance.moving is not None and balance.moving not in (*inputs, *measured):
-            raise ScenarioError(
-                f"diagnose.balances[{balance.name}].moving: {balance.moving!r} has no column."
-                f"{did_you_mean(balance.moving, (*inputs, *measured))}"
-            )
+        for name in _several(balance.moving):
+            if name not in (*inputs, *measured):
+                raise ScenarioError(
+                    f"diagnose.balances[{balance.name}].moving: {name!r} has no column."
+                    f"{did_you_mean(name, (*inputs, *measured))}"
+                )
         known = (*inputs, *measured, *(p.name for p in table.parameters))
         for text in (balance.left, *balance.terms):
             parse_formula(text, known, f"diagnose.balances[{balance.name}]")
@@ -183,10 +184,15 @@ def diagnosis(
         load=spec.load,
         empirical=spec.empirical,
         balances=tuple(
-            BalanceSpec(b.name, b.unit, b.left, tuple(b.terms), b.moving, b.band) for b in spec.balances
+            BalanceSpec(b.name, b.unit, b.left, tuple(b.terms), _several(b.moving), b.band)
+            for b in spec.balances
         ),
         blackbox=_black_box(path, spec, fmu),
     )
+
+
+def _several(names: str | list[str]) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def _black_box(path: Path, spec: DiagnoseOptionsTable, fmu: FmuDescription) -> BlackBoxSpec | None:

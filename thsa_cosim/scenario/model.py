@@ -64,13 +64,13 @@ class ForceSpec:
 
 @dataclass(frozen=True)
 class BalanceSpec:
-    """``left`` ≈ Σ c_k ``terms[k]`` between measured signals, below ``band`` Hz, while ``moving`` moves."""
+    """``left`` ≈ Σ c_k ``terms[k]`` between measured signals, below ``band`` Hz, while all of ``moving`` move."""
 
     name: str
     unit: str
     left: str
     terms: tuple[str, ...]
-    moving: str | None = None
+    moving: tuple[str, ...] = ()
     band: float = 20.0
 
 

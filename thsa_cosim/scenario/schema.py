@@ -270,8 +270,8 @@ class BalanceTable(Table):
     """Left side, such as ``"u_q"``."""
     terms: list[Name] = Field(min_length=1)
     """Right side, such as ``["i_q", "der(i_q)", "w_m"]``."""
-    moving: Name | None = None
-    """A signal; samples where it is nearly zero are left out, since stiction leaves the balance open there."""
+    moving: Name | list[Name] = Field(default_factory=list)
+    """Signals; samples where one is nearly zero are left out, since stiction leaves the balance open there."""
     band: Positive = 20.0
     """Hz; both sides are low-passed alike, without phase shift."""
 

@@ -7,6 +7,7 @@ import numpy as np
 from thsa_cosim.diagnosis.bench import Trial
 from thsa_cosim.diagnosis.closure import Identified
 from thsa_cosim.diagnosis.results import Dependence
+from thsa_cosim.diagnosis.structure import per_trial
 from thsa_cosim.scenario import Scenario
 from thsa_cosim.signals import FloatArray
 
@@ -65,11 +66,8 @@ def dependence(
 def _per_channel(trials: list[Trial], residual: FloatArray) -> Mapping[str, FloatArray]:
     """Residuals in the channels' units (all held-out recordings one after the other)."""
     parts: dict[str, list[FloatArray]] = {}
-    place = 0
-    for trial in trials:
+    for trial, own in zip(trials, per_trial(trials, residual), strict=True):
         for channel in trial.case.channels:
-            size = channel.measured.size
             unit = channel.noise / np.sqrt(channel.weight)
-            parts.setdefault(channel.name, []).append(residual[place : place + size] * unit)
-            place += size
+            parts.setdefault(channel.name, []).append(own[channel.name] * unit)
     return {name: np.concatenate(p) for name, p in parts.items()}

@@ -8,6 +8,7 @@ from thsa_cosim.diagnosis.bench import Bench
 from thsa_cosim.diagnosis.fit import Fit
 from thsa_cosim.diagnosis.scan import wave_numbers
 from thsa_cosim.diagnosis.slots import Slot
+from thsa_cosim.diagnosis.structure import per_trial
 from thsa_cosim.signals import Signals
 
 #: Periods per revolution that are looked at on a shaft; along a path: periods per largest excursion.
@@ -30,13 +31,7 @@ def scanner(
     def scan(fit: Fit) -> Mapping[str, Sequence[float]]:
         values = {t.case.name: fit.unknowns.assignments(fit.vector, t.group) for t in trials}
         signals = signals_at(values)
-        residuals: list[list[np.ndarray]] = []
-        place = 0
-        for t in trials:
-            residuals.append([])
-            for channel in t.case.channels:
-                residuals[-1].append(fit.residual[place : place + channel.measured.size])
-                place += channel.measured.size
+        residuals = per_trial(trials, fit.residual)
         found: dict[str, Sequence[float]] = {}
         for slot in chosen:
             positions, own = [], []
@@ -45,7 +40,7 @@ def scanner(
                 if run is not None:
                     times = t.case.channels[0].time
                     positions.append(np.interp(times, run.time, run[f"{slot.component}.z"]))
-                    own.append([p for p in parts if p.size == times.size])
+                    own.append([p for p in parts.values() if p.size == times.size])
             angular = slot.units.get("z") == "rad"
             reach = max((float(np.max(np.abs(z))) for z in positions), default=1.0) or 1.0
             grid = _HARMONICS if angular else 2.0 * np.pi * _PERIODS / reach

@@ -30,12 +30,22 @@ class ChannelError:
 def split(trials: Sequence[Trial], residual: FloatArray) -> dict[str, list[FloatArray]]:
     """Stacked residuals (N,) → per channel one array per recording, in standard deviations."""
     parts: dict[str, list[FloatArray]] = {}
+    for own in per_trial(trials, residual):
+        for name, part in own.items():
+            parts.setdefault(name, []).append(part)
+    return parts
+
+
+def per_trial(trials: Sequence[Trial], residual: FloatArray) -> list[dict[str, FloatArray]]:
+    """Stacked residuals (N,) → per recording its channels' residuals by name, in standard deviations."""
+    found: list[dict[str, FloatArray]] = []
     position = 0
     for trial in trials:
+        found.append({})
         for channel in trial.case.channels:
-            parts.setdefault(channel.name, []).append(residual[position : position + channel.measured.size])
+            found[-1][channel.name] = residual[position : position + channel.measured.size]
             position += channel.measured.size
-    return parts
+    return found
 
 
 def lagged(parts: Sequence[FloatArray]) -> tuple[float, float]:
@@ -81,17 +91,13 @@ def block_gains(
     Blocks are long against the correlation of the residuals, so that their scatter says what chance does.
     """
     sums: list[FloatArray] = []
-    position = 0
-    for trial in trials:
-        per_trial = []
-        for channel in trial.case.channels:
-            stop = position + channel.measured.size
-            gain = worse[position:stop] ** 2 - better[position:stop] ** 2
-            block = np.floor((channel.time - channel.time[0]) / seconds).astype(int)
-            per_trial.append(np.bincount(block, weights=gain))
-            position = stop
-        longest = max(p.size for p in per_trial)
-        sums.append(np.sum([np.pad(p, (0, longest - p.size)) for p in per_trial], axis=0))
+    for trial, gain in zip(trials, per_trial(trials, worse**2 - better**2), strict=True):
+        blocks = [
+            np.bincount(np.floor((c.time - c.time[0]) / seconds).astype(int), weights=gain[c.name])
+            for c in trial.case.channels
+        ]
+        longest = max(b.size for b in blocks)
+        sums.append(np.sum([np.pad(b, (0, longest - b.size)) for b in blocks], axis=0))
     return np.concatenate(sums)
 
 

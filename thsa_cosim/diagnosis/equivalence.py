@@ -52,10 +52,14 @@ def equivalence(found: Attribution) -> tuple[EquivalenceClass, ...]:
 def principal_angles(responses: Sequence[FloatArray]) -> FloatArray:
     """(m, m) the smallest principal angle in rad between the columns of every two of m responses (N, k)."""
     bases = [_orthonormal(response) for response in responses]
+    edges = np.cumsum([0, *(basis.shape[1] for basis in bases)])
+    together = np.concatenate(bases, axis=1)
+    products = np.asarray(together.T @ together)
     angles = np.zeros((len(bases), len(bases)))
-    for i, one in enumerate(bases):
-        for j, other in enumerate(bases[:i]):
-            largest = float(np.linalg.norm(one.T @ other, 2)) if one.size and other.size else 0.0
+    for i in range(len(bases)):
+        for j in range(i):
+            block = products[edges[i] : edges[i + 1], edges[j] : edges[j + 1]]
+            largest = float(np.linalg.norm(block, 2)) if block.size else 0.0
             angles[i, j] = angles[j, i] = np.arccos(min(largest, 1.0))
     return angles
 

@@ -13,7 +13,7 @@ from thsa_cosim.diagnosis.fit import Fit
 from thsa_cosim.diagnosis.screen import Orthogonal, Proposal
 from thsa_cosim.signals import FloatArray
 
-DRAWS = 200
+DRAWS = 1000
 _EULER = 0.5772156649
 
 
@@ -21,17 +21,20 @@ def largest_gains(base: Fit, proposals: Sequence[Proposal], seed: int, draws: in
     """(draws,) the largest gain that any of the proposals has on noise alone."""
     if not proposals:
         return np.zeros(draws)
-    generator = np.random.default_rng(seed)
     orthogonal = Orthogonal(base)
-    left = [orthogonal.remaining(p.response) for p in proposals]
-    noise = generator.standard_normal((base.residual.size, draws), dtype=np.float32)
-    best = np.zeros(draws)
-    for proposal, columns in zip(proposals, left, strict=True):
-        pull = np.asarray(columns.T @ noise, dtype=float)
-        scale = np.sqrt(np.maximum(np.diag(proposal.precision), 1e-300))
-        correlation = proposal.precision / np.outer(scale, scale)
-        whitened = np.linalg.lstsq(correlation, pull / scale[:, None], rcond=1e-6)[0]
-        best = np.maximum(best, np.sum((pull / scale[:, None]) * whitened, axis=0))
+    left = np.concatenate([orthogonal.remaining(p.response) for p in proposals], axis=1)
+    size = np.sqrt(np.maximum(np.sum(left**2, axis=0, dtype=float), 1e-300))
+    left /= size.astype(left.dtype)
+    # White noise pulls at the responses with their Gram matrix as covariance, so the noise itself need not be drawn.
+    correlation = np.asarray(left.T @ left, dtype=float)
+    values, vectors = np.linalg.eigh(correlation)
+    normal = np.random.default_rng(seed).standard_normal((values.size, draws))
+    pull = vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * normal)
+    best, position = np.zeros(draws), 0
+    for proposal in proposals:
+        own = slice(position, position := position + proposal.response.shape[1])
+        whitened = np.linalg.lstsq(correlation[own, own], pull[own], rcond=1e-6)[0]
+        best = np.maximum(best, np.sum(pull[own] * whitened, axis=0))
     return best
 
 

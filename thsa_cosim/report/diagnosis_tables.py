@@ -35,7 +35,7 @@ def print_diagnosis(console: Console, content: Content) -> None:
     if content["effects"]:
         console.print(_effects(content))
     console.print(_errors(content))
-    for text in (*_forces(content), *_faults(content), *_advice(content)):
+    for text in (*_forces(content), *_faults(content), *empirical_law(content), *_alike(content), *_advice(content)):
         console.print(Text(text), highlight=False)
     console.print(_candidates(content))
     for note in content["notes"]:
@@ -91,6 +91,30 @@ def _faults(content: Content) -> list[str]:
         f" {b['noise']:.3g}."
         for b in content["balance"]
         if b["at_fault"]
+    ]
+
+
+def empirical_law(content: Content) -> list[str]:
+    """What describes the structure that no effect explains, as an equation in the slot's variables."""
+    law = content["empirical"]
+    if law is None:
+        return []
+    terms = " + ".join(
+        f"({number(t['coefficient'], 3)} +- {number(t['stderr'], 1)} {t['unit']}) {t['term']}" for t in law["terms"]
+    )
+    fate = "It was added to the model." if law["added"] else "empirical = true in [diagnose] adds it to the model."
+    return [
+        f"Empirical law in the slot {law['slot']}, which describes and does not explain: {terms}; held-out gain"
+        f" {number(law['held_out_gain'], 3)} variances of the noise. {fate}"
+    ]
+
+
+def _alike(content: Content) -> list[str]:
+    """Candidates that would look alike in these recordings, had the unit one of them at an ordinary size."""
+    return [
+        f"These recordings could not tell apart at an ordinary size: {', '.join(c['names'])} (principal angle"
+        f" {number(c['angle_deg'], 2)} deg)."
+        for c in content["equivalence"]
     ]
 
 

@@ -88,20 +88,42 @@ static int factorize(double *restrict w, int *restrict pivot) {
     return 0;
 }
 
-static void solve(const double *restrict w, const int *restrict pivot, double *restrict b) {
+/* The factors' entries that are not 0, column by column: first those of L, then those of U. */
+static void compress(Instance *c) {
+    int n = 0;
+    for (int k = 0; k < N_X; k++) {
+        const double *col = c->lu + k * N_X;
+        c->lower[k] = n;
+        for (int i = k + 1; i < N_X; i++)
+            if (col[i] != 0.0) c->row[n] = i, c->entry[n++] = col[i];
+        c->upper[k] = n;
+        for (int i = 0; i < k; i++)
+            if (col[i] != 0.0) c->row[n] = i, c->entry[n++] = col[i];
+    }
+    c->lower[N_X] = n;
+}
+
+static void solve(const Instance *c, double *restrict b) {
     for (int k = 0; k < N_X; k++) {
         const double swap = b[k];
-        b[k] = b[pivot[k]];
-        b[pivot[k]] = swap;
+        b[k] = b[c->pivot[k]];
+        b[c->pivot[k]] = swap;
     }
     for (int k = 0; k < N_X; k++) {
         const double v = b[k];
-        for (int i = k + 1; i < N_X; i++) b[i] -= v * w[k * N_X + i];
+        for (int e = c->lower[k]; e < c->upper[k]; e++) b[c->row[e]] -= v * c->entry[e];
     }
     for (int k = N_X - 1; k >= 0; k--) {
-        const double v = b[k] *= w[k * N_X + k];
-        for (int i = 0; i < k; i++) b[i] -= v * w[k * N_X + i];
+        const double v = b[k] *= c->lu[k * (N_X + 1)];
+        for (int e = c->upper[k]; e < c->lower[k + 1]; e++) b[c->row[e]] -= v * c->entry[e];
     }
+}
+
+/* By value: terms whose coefficient is 0 may change from 0.0 to -0.0, which is no reason to factorize anew. */
+static int differ(const double *restrict one, const double *restrict other) {
+    int found = 0;
+    for (int i = 0; i < N_X * N_X; i++) found |= one[i] != other[i];
+    return found;
 }
 
 int solver_linearize(Instance *c) {
@@ -110,7 +132,7 @@ int solver_linearize(Instance *c) {
     if (c->jacobian_valid) return 0;
     const int fresh = 1 - c->current;
     if (model_jacobian(s->now.time, s->now.x, s->now.u, s->p, s->d, s->now.m, c->J[fresh], c->B, c->ft)) return 1;
-    if (memcmp(c->J[fresh], c->J[c->current], sizeof(double) * N_X * N_X) != 0) {
+    if (differ(c->J[fresh], c->J[c->current])) {
         if (c->factors_of == fresh) c->factors_of = -1;
         c->current = fresh;
     }
@@ -124,22 +146,30 @@ int solver_linearize(Instance *c) {
     return 0;
 }
 
+/* Upper half of the digits (T. Dekker, Numer. Math. 18 (1971) 224): equal for communication steps that differ by the
+ * rounding of time only, so that their matrix is factorized once. */
+static double leading_digits(double h) {
+    const double wide = 134217729.0 * h; /* 2^27 + 1 */
+    return wide - (wide - h);
+}
+
 double solver_step(Instance *c, double h) {
     const State *s = &c->s;
     const double *restrict x0 = s->now.x;
     double argument[N_X], moved[N_U + 1];
-    const double per_h = 1.0 / h;
+    const double per_h = 1.0 / h, rounded = leading_digits(h);
 
     c->dense_ready = 0;
-    if (c->factors_of != c->current || c->factored_step != h) {
-        const double shift = per_h / gamma_;
+    if (c->factors_of != c->current || c->factored_step != rounded) {
+        const double shift = 1.0 / (gamma_ * rounded);
         const double *J = c->J[c->current];
         for (int i = 0; i < N_X * N_X; i++) c->lu[i] = -J[i];
         for (int i = 0; i < N_X; i++) c->lu[i * (N_X + 1)] += shift;
         c->factors_of = -1;
         if (factorize(c->lu, c->pivot)) return -1.0;
+        compress(c);
         c->factors_of = c->current;
-        c->factored_step = h;
+        c->factored_step = rounded;
     }
 
     for (int i = 0; i < STAGES; i++) {
@@ -167,7 +197,7 @@ double solver_step(Instance *c, double h) {
         }
         if (d_[i] != 0.0)
             for (int n = 0; n < N_X; n++) U[n] += d_[i] * h * c->ft[n];
-        solve(c->lu, c->pivot, U);
+        solve(c, U);
     }
 
     const double tolerance = solver_tolerance(c);

@@ -9,7 +9,7 @@ from scipy import stats
 
 from thsa_cosim.diagnosis.fit import Fit
 from thsa_cosim.diagnosis.scan import wave_numbers
-from thsa_cosim.diagnosis.structure import block_gains, block_t, errors, structure
+from thsa_cosim.diagnosis.structure import block_gains, consistency, errors, structure
 from thsa_cosim.diagnosis.threshold import largest_gains, probability, threshold
 from thsa_cosim.diagnosis.unknowns import Unknown, Unknowns
 
@@ -90,10 +90,10 @@ def test_gains_by_blocks_of_time_say_how_sure_a_gain_is():
     worse = RNG.standard_normal(10000)
     assert block_gains(own, worse, 0.5 * worse).sum() == pytest.approx(0.75 * np.sum(worse**2))
     assert block_gains(own, worse, worse).size == 10  # of half a second each
-    assert block_t(block_gains(own, worse, 0.5 * worse)) > 10.0
+    assert consistency(block_gains(own, worse, 0.5 * worse)) > 10.0
     other = RNG.standard_normal(10000)
-    assert abs(block_t(block_gains(own, worse, other))) < 4.0
-    assert block_t(np.array([3.0])) == 0.0
+    assert abs(consistency(block_gains(own, worse, other))) < 4.0
+    assert consistency(np.array([3.0])) == 0.0
 
 
 def test_a_ripple_over_position_is_found_by_its_wave_number():

@@ -14,7 +14,7 @@ from thsa_cosim.diagnosis.candidate import Candidate
 from thsa_cosim.diagnosis.fit import Fit, refine
 from thsa_cosim.diagnosis.score import Scored, polish, score
 from thsa_cosim.diagnosis.screen import Proposal, screen, unknowns_of
-from thsa_cosim.diagnosis.structure import block_gains, block_t, structure
+from thsa_cosim.diagnosis.structure import block_gains, consistency, structure
 from thsa_cosim.diagnosis.threshold import largest_gains, probability, threshold
 from thsa_cosim.diagnosis.unknowns import Unknowns
 from thsa_cosim.signals import FloatArray
@@ -34,19 +34,25 @@ REFINED, WORTH = 6, 0.03
 #: Once an effect leaves no structure, only those that promise this share of its gain are refined as rivals.
 RIVAL_WORTH = 0.3
 
+#: If the best candidate is not believed, others are tried that gain this share of what it does, at most so many.
+NEAR, MOST_TRIED = 0.5, 4
+
 Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """One screening: its threshold, what was proposed, what was refined (best first) and what was decided."""
+    """One screening: its threshold, what was proposed, what was refined (best first) and what was decided.
+
+    ``objections``: why each of the first refined ones was not accepted, "" for the one that was.
+    """
 
     threshold: float
     proposals: tuple[Proposal, ...]
     scored: tuple[Scored, ...]
     accepted: Scored | None
-    reason: str
+    objections: tuple[str, ...]
     gains: FloatArray
 
     def probability(self, gain: float) -> float:
@@ -102,14 +108,19 @@ def attribute(
         gains = largest_gains(current, proposals, seed + number)
         limit = threshold(gains)
         scored = _refine_best(bench, current, current_held, proposals, limit, say)
-        choice, reason = _decide(bench, held, current_held, scored, limit, first=not accepted)
-        if choice is not None:
-            say(f"fitting {choice.candidate.name} with all parameters")
-            choice = polish(bench, choice, current, current_held)
-            problem = _implausible(choice)
-            if problem:
-                choice, reason = None, problem
-        rounds.append(Round(limit, tuple(proposals), tuple(scored), choice, reason, gains))
+        choice: Scored | None = None
+        objections: list[str] = []
+        for one in _near_best(scored):
+            why = _objection(bench, held, current_held, one, limit, first=not accepted)
+            if not why:
+                say(f"fitting {one.candidate.name} with all parameters")
+                one = polish(bench, one, current, current_held)
+                why = _implausible(one)
+            objections.append(why)
+            if not why:
+                choice = one
+                break
+        rounds.append(Round(limit, tuple(proposals), tuple(scored), choice, tuple(objections), gains))
         if choice is None:
             break
         accepted.append(choice)
@@ -152,36 +163,31 @@ def _refine_best(
     return sorted(scored, key=lambda s: -s.held_out_gain)
 
 
-def _decide(
-    bench: Bench, base: FloatArray, held: FloatArray, scored: Sequence[Scored], limit: float, *, first: bool
-) -> tuple[Scored | None, str]:
-    """The effect to accept, or None, and why."""
-    if not scored:
-        return None, "no candidate promises more than chance"
-    best = scored[0]
+def _near_best(scored: Sequence[Scored]) -> list[Scored]:
+    """Those that come near the best one: if that cannot be believed, one of them may take its place."""
+    near = [s for s in scored[1:] if s.held_out_gain >= NEAR * scored[0].held_out_gain]
+    return [*scored[:1], *near][:MOST_TRIED]
+
+
+def _objection(
+    bench: Bench, base: FloatArray, held: FloatArray, one: Scored, limit: float, *, first: bool
+) -> str:
+    """Why the held-out recordings do not ask for an effect, or ""."""
     left = structure(bench.of("validate"), held) / held.size
     wanted = FIRST_SHARE if first else NEXT_SHARE
-    if best.fit_gain < limit or best.held_out_gain < limit:
-        return None, f"{best.candidate.name} gains no more than chance on the held-out recordings"
-    if best.t < SIGMAS:
-        return (
-            None,
-            f"{best.candidate.name}: its held-out gain is within {SIGMAS:g} standard errors of chance",
-        )
+    name = one.candidate.name
+    if one.fit_gain < limit or one.held_out_gain < limit:
+        return f"{name} gains no more than chance on the held-out recordings"
+    if one.consistency < SIGMAS:
+        return f"{name}: its held-out gain is within {SIGMAS:g} standard errors of chance"
     if left < SMALLEST_STRUCTURE**2:
-        return None, "what is left is too small against the noise to be worth an effect"
-    if best.share < wanted:
-        return (
-            None,
-            f"{best.candidate.name} explains {100 * best.share:.0f} % of what is left, less than {100 * wanted:.0f} %",
-        )
+        return "what is left is too small against the noise to be worth an effect"
+    if one.share < wanted:
+        return f"{name} explains {100 * one.share:.0f} % of what is left, less than {100 * wanted:.0f} %"
     total = structure(bench.of("validate"), base) / held.size
-    if best.share * left < TOTAL_SHARE * total:
-        return (
-            None,
-            f"{best.candidate.name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left",
-        )
-    return best, ""
+    if one.share * left < TOTAL_SHARE * total:
+        return f"{name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left"
+    return ""
 
 
 def _implausible(choice: Scored) -> str:
@@ -226,7 +232,7 @@ def _prune(
                 continue
             lost = block_gains(bench.of("validate"), validate, held)
             total = float(base_held @ base_held - held @ held)
-            if block_t(lost) < SIGMAS or float(lost.sum()) < 0.01 * total:
+            if consistency(lost) < SIGMAS or float(lost.sum()) < 0.01 * total:
                 notes.append(
                     f"{dropped.candidate.name} was dropped: the effects found after it explain the same"
                 )
@@ -251,6 +257,6 @@ def _rivals(bench: Bench, first: Round, base: Fit, held: FloatArray) -> tuple[Sc
             continue
         polished = polish(bench, other, base, held)
         lead = block_gains(bench.of("validate"), polished.validate, winner.validate)
-        if block_t(lead) < SIGMAS or float(lead.sum()) < TIE_SHARE * winner.held_out_gain:
+        if consistency(lead) < SIGMAS or float(lead.sum()) < TIE_SHARE * winner.held_out_gain:
             rivals[name] = polished
     return tuple(rivals.values())

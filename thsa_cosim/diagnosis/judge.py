@@ -93,7 +93,7 @@ def _judge(one: Round, number: int, proposal: Proposal, scored: Scored | None, r
         )
         reason = ""
         if decision == "rejected":
-            reason = one.reason if winner is None else "explains the held-out recordings less well"
+            reason = _objection(one, scored)
         elif decision == "rival":
             reason = "explains the held-out recordings as well, within the uncertainty"
     return Judged(
@@ -107,6 +107,14 @@ def _judge(one: Round, number: int, proposal: Proposal, scored: Scored | None, r
         reason=reason,
         round=number,
     )
+
+
+def _objection(one: Round, scored: Scored) -> str:
+    """Why a refined candidate was not accepted: its own objection if it was tried, else what came before it."""
+    tried = dict(zip(map(id, one.scored), one.objections, strict=False))
+    if tried.get(id(scored)):
+        return tried[id(scored)]
+    return "explains the held-out recordings less well" if one.accepted else one.objections[0]
 
 
 def _values(proposal: Proposal, scored: Scored | None) -> Mapping[str, Value]:

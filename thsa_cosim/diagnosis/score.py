@@ -8,7 +8,7 @@ from thsa_cosim.diagnosis.bench import Bench
 from thsa_cosim.diagnosis.candidate import Candidate
 from thsa_cosim.diagnosis.fit import Fit, columns, refine
 from thsa_cosim.diagnosis.screen import Proposal, unknowns_of
-from thsa_cosim.diagnosis.structure import block_gains, block_t, structure
+from thsa_cosim.diagnosis.structure import block_gains, consistency, structure
 from thsa_cosim.signals import FloatArray
 
 #: Mean squared residual, in variances of the noise, above which a fit may have missed the optimum.
@@ -19,8 +19,8 @@ ENOUGH = 1.05
 class Scored:
     """A candidate fitted together with the declared parameters, and its score on the held-out recordings.
 
-    ``fit_gain``, ``held_out_gain``: decrease of the squared residuals in variances of the noise. ``t``: the held-out
-    gain over blocks of time in its own standard errors. ``share``: of the held-out structure explained.
+    ``fit_gain``, ``held_out_gain``: decrease of the squared residuals in variances of the noise. ``consistency``: the
+    held-out gain over blocks of time in standard errors. ``share``: of the held-out structure explained.
     """
 
     proposal: Proposal
@@ -28,7 +28,7 @@ class Scored:
     validate: FloatArray
     fit_gain: float
     held_out_gain: float
-    t: float
+    consistency: float
     share: float
 
     @property
@@ -96,7 +96,7 @@ def _scored(bench: Bench, proposal: Proposal, fit: Fit, current: Fit, held: Floa
         validate=validate,
         fit_gain=current.misfit - fit.misfit,
         held_out_gain=float(gains.sum()),
-        t=block_t(gains),
+        consistency=consistency(gains),
         share=(before - after) / before if before > 0.0 else 0.0,
     )
 

@@ -35,7 +35,13 @@ def print_diagnosis(console: Console, content: Content) -> None:
     if content["effects"]:
         console.print(_effects(content))
     console.print(_errors(content))
-    for text in (*_forces(content), *_faults(content), *empirical_law(content), *_alike(content), *_advice(content)):
+    for text in (
+        *_forces(content),
+        *_faults(content),
+        *empirical_law(content),
+        *_alike(content),
+        *_advice(content),
+    ):
         console.print(Text(text), highlight=False)
     console.print(_candidates(content))
     for note in content["notes"]:
@@ -100,9 +106,14 @@ def empirical_law(content: Content) -> list[str]:
     if law is None:
         return []
     terms = " + ".join(
-        f"({number(t['coefficient'], 3)} +- {number(t['stderr'], 1)} {t['unit']}) {t['term']}" for t in law["terms"]
+        f"({number(t['coefficient'], 3)} +- {number(t['stderr'], 1)} {t['unit']}) {t['term']}"
+        for t in law["terms"]
     )
-    fate = "It was added to the model." if law["added"] else "empirical = true in [diagnose] adds it to the model."
+    fate = (
+        "It was added to the model."
+        if law["added"]
+        else "empirical = true in [diagnose] adds it to the model."
+    )
     return [
         f"Empirical law in the slot {law['slot']}, which describes and does not explain: {terms}; held-out gain"
         f" {number(law['held_out_gain'], 3)} variances of the noise. {fate}"

@@ -171,6 +171,26 @@ def test_backlash_is_the_width_of_the_hysteresis(superset: Plant):
     assert wide - width({}) == pytest.approx(gap, rel=1e-3)
 
 
+def test_lead_error_makes_no_power(superset: Plant):
+    time = np.arange(0.0, 2.0, 1e-3)
+    inputs = Signals(
+        time,
+        {
+            "v_cmd": np.interp(time, [0.1, 0.3], [0.0, SPEED]),
+            "F_load": np.full(time.size, -2e4),
+            "T_amb": np.full(time.size, -20.0),
+        },
+    )
+    error = {"contactEffect.leadError.a_s": 2e-5, "contactEffect.leadError.n": 2.0}
+    names = ("noBack.tau_s", "noBack.w", "screw.F_s", "stabilizer.v", "contactEffect.k_e")
+    found = superset.run(error, inputs, names, time, tolerance=1e-8)
+    steady = time > 0.6
+    power = (found["noBack.tau_s"] * found["noBack.w"])[steady]
+    load = (found["screw.F_s"] * found["stabilizer.v"])[steady]
+    assert np.ptp(found["contactEffect.k_e"][steady]) > 7e-5, "the lead errs by 2 %"
+    assert np.max(np.abs(power - load)) < 1e-3 * np.max(np.abs(load))
+
+
 Law = Callable[[Mapping[str, np.ndarray]], np.ndarray]
 FRICTION: dict[str, tuple[dict[str, float], Law]] = {
     "screwEffect.stribeck": (

@@ -84,7 +84,7 @@ def find(monkeypatch: pytest.MonkeyPatch, other: Force, **changed: Any) -> Any:
     winner = scored("windage", 1.0, np.zeros(TIME.size))
     rival = scored("stribeck:screw", 2.0, np.full(TIME.size, 0.5))
     attribution = SimpleNamespace(
-        rounds=(SimpleNamespace(accepted=winner, scored=(winner, rival)),), rivals=()
+        rounds=(SimpleNamespace(accepted=winner, scored=(winner, rival), factors=np.ones(1)),), rivals=()
     )
     spec = SimpleNamespace(command="v_cmd", load="F_load")
     given = {"found": attribution, "spec": spec} | changed

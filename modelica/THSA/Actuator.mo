@@ -14,7 +14,7 @@ model Actuator "THSA in closed velocity loop, every loss a law over temperature"
     tau_f=motorEffect.F) "Motor";
   THSA.Gearbox gearbox(tau_f=gearboxEffect.F) "Gearbox";
   THSA.NoBack noBack "No-back device";
-  THSA.Screw screw(e=contactEffect.e, v_e=contactEffect.v_e) "Roller screw";
+  THSA.Screw screw(e=contactEffect.e, v_e=contactEffect.v_e, k_e=contactEffect.k_e) "Roller screw";
   THSA.Nut nut(F_f=screwEffect.F) "Nut";
   THSA.Stabilizer stabilizer "Stabilizer";
   THSA.VelocitySensor sensor "Velocity sensor";

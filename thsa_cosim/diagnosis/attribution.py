@@ -12,6 +12,7 @@ import numpy as np
 from thsa_cosim.diagnosis.bench import Bench
 from thsa_cosim.diagnosis.candidate import Candidate
 from thsa_cosim.diagnosis.fit import Fit, refine
+from thsa_cosim.diagnosis.levels import Levels
 from thsa_cosim.diagnosis.score import Scored, polish, score
 from thsa_cosim.diagnosis.screen import Proposal, screen, unknowns_of
 from thsa_cosim.diagnosis.structure import block_gains, consistency, structure
@@ -45,7 +46,8 @@ Say = Callable[[str], None]
 class Round:
     """One screening: its threshold, what was proposed, what was refined (best first) and what was decided.
 
-    ``objections``: why each of the first refined ones was not accepted, "" for the one that was.
+    ``objections``: why each of the first refined ones was not accepted, "" for the one that was. ``factors`` (N,):
+    how the residuals of the fit recordings were weighed.
     """
 
     threshold: float
@@ -54,6 +56,7 @@ class Round:
     accepted: Scored | None
     objections: tuple[str, ...]
     gains: FloatArray
+    factors: FloatArray
 
     def probability(self, gain: float) -> float:
         """Probability that chance makes at least ``gain``."""
@@ -62,14 +65,17 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class Attribution:
-    """The declared model's fit, the rounds, the accepted effects in order, and the model with them."""
+    """The declared model's fit, the rounds, the accepted effects in order, and the model with them.
+
+    ``base_validate``, ``final_validate`` (N,): held-out residuals of both, in standard deviations of the noise.
+    """
 
     base: Fit
-    base_validate: FloatArray
     rounds: tuple[Round, ...]
     accepted: tuple[Scored, ...]
     rivals: tuple[Scored, ...]
     final: Fit
+    base_validate: FloatArray
     final_validate: FloatArray
     notes: tuple[str, ...] = field(default=())
 
@@ -89,15 +95,17 @@ def attribute(
     base = refine(bench, unknowns, unknowns.start, iterations=10)
     if base is None:
         return None
-    held = bench.residuals(unknowns, base.vector[None, :], "validate")[0]
+    levels = Levels(bench)
+    base, held = levels.weigh(base)
     if held is None:
         return None
+    levels.base_held = held
     current, current_held = base, held
     rounds: list[Round] = []
     accepted: list[Scored] = []
+    rivals: tuple[Scored, ...] = ()
     for number in range(most):
-        left = structure(bench.of("validate"), current_held) / current_held.size
-        if accepted and left < SMALLEST_STRUCTURE**2:
+        if accepted and levels.left(current_held) < SMALLEST_STRUCTURE**2:
             break
         say(
             f"screening {len(candidates)} candidates"
@@ -107,35 +115,64 @@ def attribute(
         proposals = screen(bench, current, [c for c in candidates if c.key not in taken], scan(current))
         gains = largest_gains(current, proposals, seed + number)
         limit = threshold(gains)
-        scored = _refine_best(bench, current, current_held, proposals, limit, say)
-        choice: Scored | None = None
-        objections: list[str] = []
-        for one in _near_best(scored):
-            why = _objection(bench, held, current_held, one, limit, first=not accepted)
-            if not why:
-                say(f"fitting {one.candidate.name} with all parameters")
-                one = polish(bench, one, current, current_held)
-                why = _implausible(one)
-            objections.append(why)
-            if not why:
-                choice = one
-                break
-        rounds.append(Round(limit, tuple(proposals), tuple(scored), choice, tuple(objections), gains))
+        scored = _refine_best(bench, levels, current, current_held, proposals, limit, say)
+        choice, objections = _choose(bench, levels, current, current_held, scored, limit, not accepted, say)
+        factors = bench.factors("fit")
+        rounds.append(Round(limit, tuple(proposals), tuple(scored), choice, objections, gains, factors))
         if choice is None:
             break
+        if not accepted:
+            rivals = _rivals(bench, choice, scored, base, held)
         accepted.append(choice)
-        current, current_held = choice.fit, choice.validate
-    accepted, current, current_held, notes = _prune(
-        bench, unknowns, base, held, accepted, current, current_held
-    )
-    rivals = _rivals(bench, rounds[0], base, held) if rounds and rounds[0].accepted is not None else ()
+        current, reweighed = levels.weigh(choice.fit)
+        if reweighed is None:
+            return None
+        current_held = reweighed
+    accepted, current, current_held, notes = _prune(bench, unknowns, levels, accepted, current, current_held)
     return Attribution(
-        base, held, tuple(rounds), tuple(accepted), rivals, current, current_held, tuple(notes)
+        base,
+        tuple(rounds),
+        tuple(accepted),
+        rivals,
+        current,
+        levels.plain(levels.base_held, "validate"),
+        levels.plain(current_held, "validate"),
+        tuple(notes),
     )
+
+
+def _choose(
+    bench: Bench,
+    levels: Levels,
+    current: Fit,
+    held: FloatArray,
+    scored: Sequence[Scored],
+    limit: float,
+    first: bool,
+    say: Say,
+) -> tuple[Scored | None, tuple[str, ...]]:
+    """The effect to accept, fitted with all parameters, if any; why each that was tried was not, "" for it."""
+    objections: list[str] = []
+    for one in _near_best(scored):
+        why = _objection(bench, levels, held, one, limit, first)
+        if not why:
+            say(f"fitting {one.candidate.name} with all parameters")
+            one = polish(bench, one, current, held)
+            why = _implausible(one)
+        objections.append(why)
+        if not why:
+            return one, tuple(objections)
+    return None, tuple(objections)
 
 
 def _refine_best(
-    bench: Bench, current: Fit, held: FloatArray, proposals: Sequence[Proposal], limit: float, say: Say
+    bench: Bench,
+    levels: Levels,
+    current: Fit,
+    held: FloatArray,
+    proposals: Sequence[Proposal],
+    limit: float,
+    say: Say,
 ) -> list[Scored]:
     """The best proposals of the best effects, fitted with the declared parameters, best on held-out data first."""
     chosen: list[Proposal] = []
@@ -157,8 +194,7 @@ def _refine_best(
         result = score(bench, current, held, proposal)
         if result is not None:
             scored.append(result)
-            left = structure(bench.of("validate"), result.validate) / held.size
-            if left < SMALLEST_STRUCTURE**2:
+            if levels.left(result.validate) < SMALLEST_STRUCTURE**2:
                 solved = max(solved, result.fit_gain, proposal.gain)
     return sorted(scored, key=lambda s: -s.held_out_gain)
 
@@ -169,23 +205,20 @@ def _near_best(scored: Sequence[Scored]) -> list[Scored]:
     return [*scored[:1], *near][:MOST_TRIED]
 
 
-def _objection(
-    bench: Bench, base: FloatArray, held: FloatArray, one: Scored, limit: float, *, first: bool
-) -> str:
+def _objection(bench: Bench, levels: Levels, held: FloatArray, one: Scored, limit: float, first: bool) -> str:
     """Why the held-out recordings do not ask for an effect, or ""."""
-    left = structure(bench.of("validate"), held) / held.size
     wanted = FIRST_SHARE if first else NEXT_SHARE
     name = one.candidate.name
     if one.fit_gain < limit or one.held_out_gain < limit:
         return f"{name} gains no more than chance on the held-out recordings"
     if one.consistency < SIGMAS:
         return f"{name}: its held-out gain is within {SIGMAS:g} standard errors of chance"
-    if left < SMALLEST_STRUCTURE**2:
+    if levels.left(held) < SMALLEST_STRUCTURE**2:
         return "what is left is too small against the noise to be worth an effect"
     if one.share < wanted:
         return f"{name} explains {100 * one.share:.0f} % of what is left, less than {100 * wanted:.0f} %"
-    total = structure(bench.of("validate"), base) / held.size
-    if one.share * left < TOTAL_SHARE * total:
+    held_out = bench.of("validate")
+    if one.share * structure(held_out, held) < TOTAL_SHARE * structure(held_out, levels.base_held):
         return f"{name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left"
     return ""
 
@@ -212,8 +245,7 @@ def _implausible(choice: Scored) -> str:
 def _prune(
     bench: Bench,
     unknowns: Unknowns,
-    base: Fit,
-    base_held: FloatArray,
+    levels: Levels,
     accepted: list[Scored],
     current: Fit,
     held: FloatArray,
@@ -231,7 +263,7 @@ def _prune(
             if fit is None or validate is None:
                 continue
             lost = block_gains(bench.of("validate"), validate, held)
-            total = float(base_held @ base_held - held @ held)
+            total = float(levels.base_held @ levels.base_held - held @ held)
             if consistency(lost) < SIGMAS or float(lost.sum()) < 0.01 * total:
                 notes.append(
                     f"{dropped.candidate.name} was dropped: the effects found after it explain the same"
@@ -243,13 +275,12 @@ def _prune(
     return accepted, current, held, notes
 
 
-def _rivals(bench: Bench, first: Round, base: Fit, held: FloatArray) -> tuple[Scored, ...]:
+def _rivals(
+    bench: Bench, winner: Scored, scored: Sequence[Scored], base: Fit, held: FloatArray
+) -> tuple[Scored, ...]:
     """Other effects than the first accepted one that explain held-out recordings as well, within the uncertainty."""
-    winner = first.accepted
-    if winner is None:
-        return ()
     rivals: dict[str, Scored] = {}
-    for other in first.scored:
+    for other in scored:
         name = other.candidate.effect.name
         if name == winner.candidate.effect.name or name in rivals:
             continue

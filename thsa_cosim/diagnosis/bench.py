@@ -45,6 +45,18 @@ class Bench:
         self.failures: dict[str, int] = {}
         self._runner = runner
         self._fixed = dict(fixed or {})
+        self.weights: Mapping[str, float] = {}
+        """Factors of the channels' residuals, 1 where none is given."""
+
+    def factors(self, part: Part) -> FloatArray:
+        """(N,) what the stacked residuals of ``part`` are multiplied by."""
+        return np.concatenate(
+            [
+                np.full(channel.measured.size, self.weights.get(channel.name, 1.0))
+                for trial in self.of(part)
+                for channel in trial.case.channels
+            ]
+        )
 
     def of(self, part: Part) -> tuple[Trial, ...]:
         """The recordings that play ``part``."""
@@ -53,7 +65,7 @@ class Bench:
     def residuals(self, unknowns: Unknowns, vectors: FloatArray, part: Part) -> list[FloatArray | None]:
         """Per vector (m, n) the stacked residuals (N,) over the recordings of ``part``, None where a run failed.
 
-        Simulated minus measured, in standard deviations of the noise.
+        Simulated minus measured, in standard deviations of the noise, times the channel's factor.
         """
         trials = self.of(part)
         jobs = [
@@ -63,6 +75,7 @@ class Bench:
         ]
         outcomes = self._runner.run(jobs)
         self.evaluations += len(jobs)
+        factors = self.factors(part) if self.weights else None
         found: list[FloatArray | None] = []
         for k in range(len(vectors)):
             parts: list[FloatArray] = []
@@ -71,7 +84,8 @@ class Bench:
                     parts.append(outcome.reduced)
                 else:
                     self.failures[outcome.reason] = self.failures.get(outcome.reason, 0) + 1
-            found.append(np.concatenate(parts) if len(parts) == len(trials) else None)
+            residual = np.concatenate(parts) if len(parts) == len(trials) else None
+            found.append(residual if residual is None or factors is None else residual * factors)
         return found
 
     def signals(self, unknowns: Unknowns, vector: FloatArray) -> dict[str, Signals | None]:

@@ -108,11 +108,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Effect:
-    """A physical effect: what it is, where it is described, how it shows, and how a model gets it.
-
-    ``injection`` names how the effect is put around a black-box FMU: ``"load"`` (through the load input),
-    ``"output"`` (on an output), or None if it cannot be.
-    """
+    """A physical effect: what it is, where it is described, how it shows, and how a model gets it."""
 
     name: str
     title: str
@@ -120,4 +116,3 @@ class Effect:
     source: str
     signature: str
     variants: tuple[Variant, ...]
-    injection: Literal["load", "output"] | None = None

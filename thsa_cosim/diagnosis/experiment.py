@@ -76,7 +76,8 @@ def separating_experiment(
         distance = _distance(one.signals, other.signals, weights)
         if best is None or distance > best.distance:
             names = (pair[0].candidate.name, pair[1].candidate.name)
-            best = SeparatingExperiment(profile.name, names, distance, _present(pair, fit, time.size), own)
+            present = _present(pair, found.rounds[0].factors, fit, time.size)
+            best = SeparatingExperiment(profile.name, names, distance, present, own)
     return best
 
 
@@ -112,8 +113,8 @@ def _distance(one: Signals, other: Signals, weights: Mapping[str, float]) -> flo
     return float(sum(w * np.sum((one[n] - other[n]) ** 2) for n, w in weights.items()))
 
 
-def _present(pair: tuple[Scored, Scored], fit: Sequence[Trial], samples: int) -> float:
+def _present(pair: tuple[Scored, Scored], factors: FloatArray, fit: Sequence[Trial], samples: int) -> float:
     """Distance of both on the fit recordings, scaled to ``samples`` of every output."""
-    difference = pair[0].fit.residual - pair[1].fit.residual
+    difference = (pair[0].fit.residual - pair[1].fit.residual) / factors
     recorded = sum(t.case.channels[0].measured.size for t in fit)
     return float(difference @ difference) * samples / recorded

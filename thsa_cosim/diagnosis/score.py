@@ -108,7 +108,7 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scor
     """
     unknowns = choice.fit.unknowns
     drawing = np.where([u.declared for u in unknowns.members], unknowns.start, choice.fit.vector)
-    fits = [refine(bench, unknowns, choice.fit.vector, residual=choice.fit.residual, steps=choice.fit.steps)]
+    fits = [refine(bench, unknowns, choice.fit.vector, steps=choice.fit.steps)]
     if fits[0] is None or fits[0].misfit > ENOUGH * fits[0].residual.size:
         fits.append(refine(bench, unknowns, drawing))
     best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)

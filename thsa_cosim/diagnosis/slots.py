@@ -27,7 +27,7 @@ INPUTS: Mapping[str, tuple[str, ...]] = {
 }
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "FrictionEffect": ("F",),
-    "ContactEffect": ("e", "v_e"),
+    "ContactEffect": ("e", "v_e", "k_e"),
     "HeatingEffect": ("g_R", "g_psi"),
     "TorqueConstantEffect": ("g_t", "g_e"),
     "VoltageEffect": ("du",),

@@ -7,5 +7,6 @@ block Backlash "Clearance between screw and nut"
 equation
   e = if delta > h then -h elseif delta < -h then h else -c*delta;
   v_e = if delta > h or delta < -h then 0 else -c*v_s;
+  k_e = 0;
   annotation(Documentation(info="<html><p>Dead zone of width gap in the deflection of the contact.</p></html>"));
 end Backlash;

@@ -4,5 +4,6 @@ block NoContact "Contact without clearance or lead error"
 equation
   e = 0;
   v_e = 0;
+  k_e = 0;
   annotation(Documentation(info="<html><p>Default of the contact slot.</p></html>"));
 end NoContact;

@@ -25,5 +25,4 @@ EFFECT = Effect(
             law=offset,
         ),
     ),
-    injection="output",
 )

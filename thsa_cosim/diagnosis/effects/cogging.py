@@ -40,5 +40,4 @@ EFFECT = Effect(
             law=torque,
         ),
     ),
-    injection="load",
 )

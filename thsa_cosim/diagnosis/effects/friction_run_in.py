@@ -63,5 +63,4 @@ EFFECT = Effect(
             law=friction_over_time,
         ),
     ),
-    injection="load",
 )

@@ -37,5 +37,4 @@ EFFECT = Effect(
             law=voltage,
         ),
     ),
-    injection=None,
 )

@@ -71,5 +71,4 @@ EFFECT = Effect(
             law=friction,
         ),
     ),
-    injection="load",
 )

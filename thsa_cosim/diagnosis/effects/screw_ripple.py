@@ -85,5 +85,4 @@ EFFECT = Effect(
             ),
         ),
     ),
-    injection="load",
 )

@@ -37,5 +37,4 @@ EFFECT = Effect(
             law=friction,
         ),
     ),
-    injection="load",
 )

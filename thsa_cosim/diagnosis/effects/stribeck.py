@@ -38,5 +38,4 @@ EFFECT = Effect(
             law=breakaway,
         ),
     ),
-    injection="load",
 )

@@ -41,5 +41,4 @@ EFFECT = Effect(
             law=fall,
         ),
     ),
-    injection="load",
 )

@@ -26,5 +26,4 @@ EFFECT = Effect(
             law=error,
         ),
     ),
-    injection="output",
 )

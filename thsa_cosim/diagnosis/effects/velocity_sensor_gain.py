@@ -24,5 +24,4 @@ EFFECT = Effect(
             law=error,
         ),
     ),
-    injection="output",
 )

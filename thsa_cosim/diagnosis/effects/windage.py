@@ -24,5 +24,4 @@ EFFECT = Effect(
             law=drag,
         ),
     ),
-    injection="load",
 )

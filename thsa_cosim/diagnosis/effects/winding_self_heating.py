@@ -37,5 +37,4 @@ EFFECT = Effect(
             ),
         ),
     ),
-    injection=None,
 )

@@ -129,11 +129,19 @@ def attribute(
             return None
         current_held = reweighed
     accepted, current, current_held, notes = _prune(bench, unknowns, levels, accepted, current, current_held)
+    while accepted and (name := out_of_range(current)):
+        notes.append(f"{accepted[-1].candidate.name} was dropped: it drives {name} to the end of its range")
+        accepted = accepted[:-1]
+        current = accepted[-1].fit if accepted else base
+        fallen = bench.residuals(current.unknowns, current.vector[None, :], "validate")[0]
+        if fallen is None:
+            return None
+        current_held = fallen
     return Attribution(
         base,
         tuple(rounds),
         tuple(accepted),
-        rivals,
+        rivals if accepted and accepted[0] is rounds[0].accepted else (),
         current,
         levels.plain(levels.base_held, "validate"),
         levels.plain(current_held, "validate"),
@@ -153,16 +161,20 @@ def _choose(
 ) -> tuple[Scored | None, tuple[str, ...]]:
     """The effect to accept, fitted with all parameters, if any; why each that was tried was not, "" for it."""
     objections: list[str] = []
+    doubtful: Scored | None = None
     for one in _near_best(scored):
         why = _objection(bench, levels, held, one, limit, first)
         if not why:
             say(f"fitting {one.candidate.name} with all parameters")
             one = polish(bench, one, current, held)
-            why = _implausible(one)
+            why = _insignificant(one)
+            if not why and (name := out_of_range(one.fit)):
+                why = f"{one.candidate.name}: it drives the declared parameter {name} to the end of its range"
+                doubtful = doubtful or one  # another effect that is still missing may do that
         objections.append(why)
         if not why:
             return one, tuple(objections)
-    return None, tuple(objections)
+    return doubtful, tuple(objections)
 
 
 def _refine_best(
@@ -223,8 +235,8 @@ def _objection(bench: Bench, levels: Levels, held: FloatArray, one: Scored, limi
     return ""
 
 
-def _implausible(choice: Scored) -> str:
-    """Why a fit cannot be believed, or ""."""
+def _insignificant(choice: Scored) -> str:
+    """Why a fit cannot be told from a model without the effect, or ""."""
     fit = choice.fit
     inflation = max(1.0, fit.misfit / fit.residual.size)
     stderr = fit.stderr(inflation)
@@ -234,11 +246,14 @@ def _implausible(choice: Scored) -> str:
         sizes.append(abs(fit.vector[k] - p.neutral) / max(stderr[k], 1e-300))
     if max(sizes) < SIGMAS:
         return f"{choice.candidate.name}: the interval of its coefficient includes zero"
+    return ""
+
+
+def out_of_range(fit: Fit) -> str:
+    """Name of a declared parameter that a fit drives to the end of its range, or ""."""
     for u, x in zip(fit.unknowns.members, fit.vector, strict=True):
         if u.declared and (x <= u.lower or x >= u.upper):
-            return (
-                f"{choice.candidate.name}: it drives the declared parameter {u.name} to the end of its range"
-            )
+            return u.name
     return ""
 
 

@@ -5,8 +5,8 @@ from thsa_cosim.signals import FloatArray
 
 
 def offset(p: Values, at: Connectors) -> FloatArray:
-    """-gap/2 on the flank that carries (``side``: 1 where the screw pushes forwards, else -1)."""
-    return -0.5 * p["gap"] * at["side"]
+    """-gap/2 on the flank that carries (``side``: 1 where the screw pushes forwards, else -1), from the start's."""
+    return -0.5 * p["gap"] * (at["side"] - p["s_0"])
 
 
 EFFECT = Effect(
@@ -21,6 +21,16 @@ EFFECT = Effect(
             block="Backlash",
             parameters=(
                 EffectParameter("gap", "m", 2e-05, "clearance, flank to flank", lower=0.0, upper=0.05),
+                EffectParameter(
+                    "s_0",
+                    "1",
+                    0.5,
+                    "flank at the start (1: the screw pushes forwards)",
+                    role="shape",
+                    lower=-1.0,
+                    upper=1.0,
+                    starts=(0.0,),
+                ),
             ),
             law=offset,
         ),

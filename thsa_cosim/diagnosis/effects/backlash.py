@@ -5,8 +5,8 @@ from thsa_cosim.signals import FloatArray
 
 
 def offset(p: Values, at: Connectors) -> FloatArray:
-    """-gap/2 on the flank that carries (``side``: 1 where the screw pushes forwards, else -1), from the start's."""
-    return -0.5 * p["gap"] * (at["side"] - p["s_0"])
+    """-gap/2 on the flank that carries (``side``: 1 where the screw pushes forwards, else -1), less the start's."""
+    return -0.5 * p["gap"] * (at["side"] - p["s_0"] * at["side"][0])
 
 
 EFFECT = Effect(
@@ -25,9 +25,9 @@ EFFECT = Effect(
                     "s_0",
                     "1",
                     0.5,
-                    "flank at the start (1: the screw pushes forwards)",
+                    "share of its half that the load has taken up at the start",
                     role="shape",
-                    lower=-1.0,
+                    lower=0.0,
                     upper=1.0,
                     starts=(0.0,),
                 ),

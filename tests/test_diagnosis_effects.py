@@ -220,6 +220,10 @@ FRICTION: dict[str, tuple[dict[str, float], Law]] = {
         {"a_s": 0.5, "a_c": -0.2, "n": 3.0},
         lambda q: (0.5 * np.sin(3.0 * q["z"]) - 0.2 * np.cos(3.0 * q["z"])) * q["s"],
     ),
+    "gearboxEffect.rippleOfLoad": (
+        {"a_s": 0.02, "a_c": -0.01, "n": 3.0},
+        lambda q: (0.02 * np.sin(3.0 * q["z"]) - 0.01 * np.cos(3.0 * q["z"])) * q["N"],
+    ),
     "screwEffect.positionFriction": (
         {"c1": 2e4, "c2": 300.0, "z_2": 2e-3, "w_2": 5e-4, "c_s": 100.0, "c_c": 50.0, "kappa": 2e3},
         lambda q: (

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from thsa_cosim.diagnosis.bench import Bench
+from thsa_cosim.diagnosis.bench import Bench, Trial
 from thsa_cosim.diagnosis.candidate import Candidate
 from thsa_cosim.diagnosis.fit import Fit, refine
 from thsa_cosim.diagnosis.levels import Levels
 from thsa_cosim.diagnosis.score import Scored, polish, score
 from thsa_cosim.diagnosis.screen import Proposal, screen, unknowns_of
-from thsa_cosim.diagnosis.structure import block_gains, consistency, structure
+from thsa_cosim.diagnosis.structure import block_gains, consistency, structures
 from thsa_cosim.diagnosis.threshold import largest_gains, probability, threshold
 from thsa_cosim.diagnosis.unknowns import Unknowns
 from thsa_cosim.signals import FloatArray
@@ -24,8 +24,9 @@ from thsa_cosim.signals import FloatArray
 SIGMAS = 3.0
 #: The share of the structure left that a first and a further effect must explain on the held-out recordings.
 FIRST_SHARE, NEXT_SHARE = 0.15, 0.2
-#: A further effect must explain this share of what the declared model left, or it may be the first one's misfit.
-TOTAL_SHARE = 0.01
+#: A further effect must explain this share of what the declared model left in some channel, or it may be the misfit of
+#: the first one.
+TOTAL_SHARE = 0.02
 #: Structure below this many standard deviations of the noise (rms over all channels) is not worth an effect.
 SMALLEST_STRUCTURE = 0.08
 #: Rivals that leave less than this share of the gain unexplained cannot be told apart.
@@ -229,10 +230,15 @@ def _objection(bench: Bench, levels: Levels, held: FloatArray, one: Scored, limi
         return "what is left is too small against the noise to be worth an effect"
     if one.share < wanted:
         return f"{name} explains {100 * one.share:.0f} % of what is left, less than {100 * wanted:.0f} %"
-    held_out = bench.of("validate")
-    if one.share * structure(held_out, held) < TOTAL_SHARE * structure(held_out, levels.base_held):
+    if _explained(bench.of("validate"), levels.base_held, held, one.validate) < TOTAL_SHARE:
         return f"{name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left"
     return ""
+
+
+def _explained(trials: Sequence[Trial], base: FloatArray, before: FloatArray, after: FloatArray) -> float:
+    """Largest share over the channels of what the declared model left (``base``) that a step explains."""
+    whole, first, last = (structures(trials, residual) for residual in (base, before, after))
+    return max((first[name] - last[name]) / max(whole[name], SMALLEST_STRUCTURE**2) for name in whole)
 
 
 def _insignificant(choice: Scored) -> str:

@@ -27,7 +27,7 @@ from thsa_cosim.diagnosis.problem import declared_unknowns, spec_of, trials_of
 from thsa_cosim.diagnosis.results import Comparison, DiagnosisResult, EmpiricalLaw, Verdict
 from thsa_cosim.diagnosis.scanning import scanner
 from thsa_cosim.diagnosis.score import Scored
-from thsa_cosim.diagnosis.structure import ChannelError, errors, structure
+from thsa_cosim.diagnosis.structure import ChannelError, errors, worst_share
 from thsa_cosim.diagnosis.superset import Superset, open_superset
 from thsa_cosim.diagnosis.unknowns import Unknowns
 from thsa_cosim.errors import StudyError
@@ -36,7 +36,7 @@ from thsa_cosim.identify import ForceBalance, force_balance, open_study, study_i
 from thsa_cosim.identify.study import describe
 from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
 
-#: More than this share of the structure left after all effects: something else is missing.
+#: More than this share of some channel's structure left after all effects: something else is missing.
 UNEXPLAINED_SHARE = 0.25
 #: Structure (rms in standard deviations of the noise, in some channel) and its significance that count as such.
 VISIBLE, SIGNIFICANT = 0.15, 6.0
@@ -209,11 +209,10 @@ class _Closing:
     def _verdict(
         self, before: Identified, after: Identified, accepted: Sequence[Scored]
     ) -> tuple[float, Verdict]:
-        """Share of the held-out structure that is left, and the verdict."""
+        """Share of the held-out structure that is left in the worst channel, and the verdict."""
         held_out = tuple(t for t in self.trials if t.part == "validate")
-        first, last = structure(held_out, before.validate), structure(held_out, after.validate)
         visible = is_visible(errors(held_out, after.validate))
-        share = float(np.clip(last / first, 0.0, 1.0)) if first > 0.0 and visible else 0.0
+        share = worst_share(held_out, before.validate, after.validate) if visible else 0.0
         if accepted and not (visible and share > UNEXPLAINED_SHARE):
             return share, "missing-effect"
         return share, "unexplained-structure" if visible else "no-missing-effect"

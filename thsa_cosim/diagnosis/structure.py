@@ -13,6 +13,9 @@ from scipy.stats import rankdata
 from thsa_cosim.diagnosis.bench import Trial
 from thsa_cosim.signals import FloatArray
 
+#: Structure (rms, in standard deviations of the noise) below which a share of it says little.
+HARDLY = 0.5
+
 
 @dataclass(frozen=True)
 class ChannelError:
@@ -56,11 +59,26 @@ def lagged(parts: Sequence[FloatArray]) -> tuple[float, float]:
     return float(products.mean()), min(power, 1.5) / np.sqrt(products.size)
 
 
+def structures(trials: Sequence[Trial], residual: FloatArray) -> dict[str, float]:
+    """Per channel the mean square of the structure, in variances of the noise; may be negative."""
+    return {name: lagged(parts)[0] for name, parts in split(trials, residual).items()}
+
+
 def structure(trials: Sequence[Trial], residual: FloatArray) -> float:
     """Sum over channels and samples of the squared structure, in variances of the noise; may be negative."""
     return float(
         sum(lagged(parts)[0] * sum(p.size for p in parts) for parts in split(trials, residual).values())
     )
+
+
+def worst_share(trials: Sequence[Trial], before: FloatArray, after: FloatArray) -> float:
+    """Largest share of a channel's structure ``before`` (N,) that is left ``after`` (N,), 0 to 1.
+
+    Channel by channel, or position, which sums up every error of speed, would hide all others; where there was hardly
+    any structure before, as a share of ``HARDLY`` squared.
+    """
+    first, last = structures(trials, before), structures(trials, after)
+    return float(np.clip(max(last[name] / max(first[name], HARDLY**2) for name in first), 0.0, 1.0))
 
 
 def errors(trials: Sequence[Trial], residual: FloatArray) -> Mapping[str, ChannelError]:

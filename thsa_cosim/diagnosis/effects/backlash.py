@@ -1,12 +1,15 @@
 """Clearance between screw and nut."""
 
+import numpy as np
+
 from thsa_cosim.diagnosis.effect import Connectors, Effect, EffectParameter, Values, Variant
 from thsa_cosim.signals import FloatArray
 
 
 def offset(p: Values, at: Connectors) -> FloatArray:
     """-gap/2 on the flank that carries (``side``: 1 where the screw pushes forwards, else -1), less the start's."""
-    return -0.5 * p["gap"] * (at["side"] - p["s_0"] * at["side"][0])
+    side = at["side"]
+    return np.asarray(-0.5 * p["gap"] * (side - p["s_0"] * side[0]))
 
 
 EFFECT = Effect(

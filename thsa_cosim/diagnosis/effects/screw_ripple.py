@@ -16,73 +16,43 @@ def ripple_friction(p: Values, at: Connectors) -> FloatArray:
     return ripple(p, at) * at["s"]
 
 
+def ripple_of_load(p: Values, at: Connectors) -> FloatArray:
+    """The same in proportion to the load."""
+    return ripple(p, at) * at["N"]
+
+
+def _parameters(dimension: str, typical: float) -> tuple[EffectParameter, ...]:
+    return (
+        EffectParameter("a_s", dimension, typical, "amplitude, sine part"),
+        EffectParameter("a_c", dimension, typical, "amplitude, cosine part"),
+        EffectParameter(
+            "n",
+            "W",
+            1.0,
+            "periods per revolution",
+            role="shape",
+            lower=0.1,
+            upper=1000.0,
+            starts=(1.0, 2.0),
+            scanned=True,
+        ),
+    )
+
+
 EFFECT = Effect(
     name="screw-ripple",
     title="Ripple of the screw with its angle",
-    physics="torque or friction a sin(n phi_g + phase), or a lead error of the same form",
+    physics="torque, friction or share of the load a sin(n phi_g + phase), or a lead error of the same form",
     source="Mei, Tsutsumi, Tao, Sun, Mechanism and Machine Theory 38 (2003); ISO 3408-3 (lead deviation)",
     signature="periodic in the screw's angle: in the current (torque, friction) or in position (lead)",
     variants=(
+        Variant("FrictionEffect", "Ripple", _parameters("F", 0.01), ("gearbox", "guide"), ripple),
         Variant(
-            interface="FrictionEffect",
-            block="Ripple",
-            parameters=(
-                EffectParameter("a_s", "F", 0.01, "amplitude, sine part"),
-                EffectParameter("a_c", "F", 0.01, "amplitude, cosine part"),
-                EffectParameter(
-                    "n",
-                    "W",
-                    1.0,
-                    "periods per revolution",
-                    role="shape",
-                    lower=0.1,
-                    upper=1000.0,
-                    starts=(1.0, 2.0),
-                    scanned=True,
-                ),
-            ),
-            slots=("gearbox", "guide"),
-            law=ripple,
+            "FrictionEffect", "RippleFriction", _parameters("F", 0.01), ("gearbox", "guide"), ripple_friction
         ),
         Variant(
-            interface="FrictionEffect",
-            block="RippleFriction",
-            parameters=(
-                EffectParameter("a_s", "F", 0.01, "amplitude, sine part"),
-                EffectParameter("a_c", "F", 0.01, "amplitude, cosine part"),
-                EffectParameter(
-                    "n",
-                    "W",
-                    1.0,
-                    "periods per revolution",
-                    role="shape",
-                    lower=0.1,
-                    upper=1000.0,
-                    starts=(1.0, 2.0),
-                    scanned=True,
-                ),
-            ),
-            slots=("gearbox", "guide"),
-            law=ripple_friction,
+            "FrictionEffect", "RippleOfLoad", _parameters("1", 0.01), ("gearbox", "guide"), ripple_of_load
         ),
-        Variant(
-            interface="ContactEffect",
-            block="LeadError",
-            parameters=(
-                EffectParameter("a_s", "m", 2e-06, "amplitude, sine part"),
-                EffectParameter("a_c", "m", 2e-06, "amplitude, cosine part"),
-                EffectParameter(
-                    "n",
-                    "W",
-                    1.0,
-                    "periods per revolution",
-                    role="shape",
-                    lower=0.1,
-                    upper=1000.0,
-                    starts=(1.0, 2.0),
-                    scanned=True,
-                ),
-            ),
-        ),
+        Variant("ContactEffect", "LeadError", _parameters("m", 2e-06)),
     ),
 )

@@ -87,13 +87,14 @@ def attribute(
     candidates: Sequence[Candidate],
     scan: Scan,
     *,
+    start: FloatArray | None = None,
     seed: int,
     most: int = 3,
     say: Say = lambda _: None,
 ) -> Attribution | None:
-    """Find the effects; None if the declared model cannot be simulated at its start."""
+    """Find the effects, the declared parameters from ``start`` (default: the drawing); None if that does not run."""
     say("fitting the declared model")
-    base = refine(bench, unknowns, unknowns.start, iterations=10)
+    base = refine(bench, unknowns, unknowns.start if start is None else start, iterations=10)
     if base is None:
         return None
     levels = Levels(bench)

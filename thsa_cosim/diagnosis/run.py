@@ -78,18 +78,24 @@ def diagnose(
     else:
         say("exporting the superset of all effects")
         tested = open_superset(scenario, spec.model, trials, effects.values(), folder / WORK)
+    box = tested if isinstance(tested, BlackBox) else None
+    say("identifying the declared model from the drawing")
+    declared = trials if box is None else box.with_effects(())
+    before = identify_from_drawing(
+        scenario.fmu.path, declared, unknowns, (), scenario.simulation, workers, cluster
+    )
     with open_runner(scenario.simulation, [t.experiment for t in tested.trials], workers, cluster) as runner:
         bench = Bench(runner, tested.trials)
         scan = scanner(bench, tested.slots, tested.signals_at)
+        start = before.fit.vector
         found = attribute(
-            bench, unknowns, tested.candidates, scan, seed=scenario.seed, most=spec.most, say=say
+            bench, unknowns, tested.candidates, scan, start=start, seed=scenario.seed, most=spec.most, say=say
         )
     if found is None:
         reason = next(iter(bench.failures), "no run succeeded")
-        raise StudyError(f"{scenario.path}: the declared model cannot be simulated: {reason}")
-    box = tested if isinstance(tested, BlackBox) else None
+        raise StudyError(f"{scenario.path}: the model with all effects cannot be simulated: {reason}")
     return _Closing(
-        scenario, spec, folder, workers, cluster, trials, unknowns, found, bench, say, box
+        scenario, spec, folder, workers, cluster, trials, unknowns, before, found, bench, say, box
     ).result()
 
 
@@ -104,16 +110,15 @@ class _Closing:
     cluster: str | None
     trials: tuple[Trial, ...]
     unknowns: Unknowns
+    before: Identified
     found: Attribution
     bench: Bench
     say: Say
     box: BlackBox | None = None
 
     def result(self) -> DiagnosisResult:
-        """Identify both models on their own FMUs and judge them."""
-        scenario, found = self.scenario, self.found
-        self.say("identifying the declared model from the drawing")
-        before = self._identify(scenario.fmu.path, self.unknowns, [found.base.vector])
+        """Identify the extended model on its own FMU as the declared one was, and judge both."""
+        scenario, found, before = self.scenario, self.found, self.before
         accepted, notes, after = found.accepted, list(found.notes), before
         model: Path | None = None
         extended: Path | None = None
@@ -199,7 +204,7 @@ class _Closing:
         return model, extended, self._identify(extended, wider, [hint], added)
 
     def _identify(
-        self, fmu: Path, unknowns: Unknowns, hints: Sequence[np.ndarray], accepted: Sequence[Scored] = ()
+        self, fmu: Path, unknowns: Unknowns, hints: Sequence[np.ndarray], accepted: Sequence[Scored]
     ) -> Identified:
         trials = self.trials if self.box is None else self.box.with_effects(accepted)
         return identify_from_drawing(

@@ -13,7 +13,7 @@ from thsa_cosim.diagnosis.bench import Bench, Trial
 from thsa_cosim.diagnosis.candidate import Candidate
 from thsa_cosim.diagnosis.fit import Fit, refine
 from thsa_cosim.diagnosis.levels import Levels
-from thsa_cosim.diagnosis.score import Scored, polish, score
+from thsa_cosim.diagnosis.score import Scored, go_on, polish, score
 from thsa_cosim.diagnosis.screen import Proposal, screen, unknowns_of
 from thsa_cosim.diagnosis.structure import block_gains, consistency, structures
 from thsa_cosim.diagnosis.threshold import largest_gains, probability, threshold
@@ -33,7 +33,8 @@ SMALLEST_STRUCTURE = 0.08
 TIE_SHARE = 0.005
 #: How many effects are refined after each screening, if they promise at least this share of the best one's gain.
 REFINED, WORTH = 6, 0.03
-#: Once an effect leaves no structure, only those that promise this share of its gain are refined as rivals.
+#: Once an effect leaves no structure, only those that promise this share of its gain are refined as rivals; and only
+#: those that reach this share of the best gain in two iterations are refined further.
 RIVAL_WORTH = 0.3
 
 #: If the best candidate is not believed, others are tried that gain this share of what it does, at most so many.
@@ -210,6 +211,8 @@ def _refine_best(
             scored.append(result)
             if levels.left(result.validate) < SMALLEST_STRUCTURE**2:
                 solved = max(solved, result.fit_gain, proposal.gain)
+    most = max((s.fit_gain for s in scored), default=0.0)
+    scored = [go_on(bench, s, current, held) if s.fit_gain > RIVAL_WORTH * most else s for s in scored]
     return sorted(scored, key=lambda s: -s.held_out_gain)
 
 

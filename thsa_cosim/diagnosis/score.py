@@ -42,7 +42,7 @@ class Scored:
 
 
 def score(
-    bench: Bench, current: Fit, held: FloatArray, proposal: Proposal, iterations: int = 5
+    bench: Bench, current: Fit, held: FloatArray, proposal: Proposal, iterations: int = 2
 ) -> Scored | None:
     """Fit a proposal's parameters beside the current ones, whose Jacobian is kept, and score it; None if it fails."""
     own = unknowns_of(proposal.candidate, proposal.shapes)
@@ -82,6 +82,25 @@ def score(
         enough=3.0,
     )
     return None if fit is None else _scored(bench, proposal, fit, current, held)
+
+
+def go_on(bench: Bench, scored: Scored, current: Fit, held: FloatArray, iterations: int = 4) -> Scored:
+    """The same with further iterations, the Jacobian's columns of the declared parameters kept as in `score`."""
+    fit = scored.fit
+    if fit.converged:
+        return scored
+    again = refine(
+        bench,
+        fit.unknowns,
+        fit.vector,
+        residual=fit.residual,
+        jacobian=fit.jacobian,
+        steps=fit.steps,
+        fresh=list(range(len(current.unknowns.members), len(fit.unknowns.members))),
+        iterations=iterations,
+        enough=3.0,
+    )
+    return scored if again is None else _scored(bench, scored.proposal, again, current, held) or scored
 
 
 def _scored(bench: Bench, proposal: Proposal, fit: Fit, current: Fit, held: FloatArray) -> Scored | None:

@@ -185,6 +185,30 @@ def test_backlash_that_the_load_has_taken_up_starts_at_rest(superset: Plant, loa
     assert moved(0.0) > 8e-5
 
 
+def test_torque_ripple_counts_for_the_no_back_device(superset: Plant):
+    ripple = {
+        "shaftEffect.torqueRipple.a_s": 1.5,
+        "shaftEffect.torqueRipple.c_c": 0.05,
+        "shaftEffect.torqueRipple.n": 2.0,
+    }
+    names = (
+        "noBack.tau_s",
+        "noBack.tau_nb",
+        "noBack.s",
+        "screw.F_s",
+        "gearbox.flange_b.phi",
+        "shaftEffect.tau",
+    )
+    found = run(superset, ripple, names)
+    phi, contact = found["gearbox.flange_b.phi"], rig().k * found["screw.F_s"]
+    wanted = 1.5 * np.sin(2.0 * phi) + 0.05 * contact * np.cos(2.0 * phi)
+    np.testing.assert_allclose(found["shaftEffect.tau"], wanted, atol=1e-6)
+    np.testing.assert_allclose(found["noBack.tau_s"], contact + wanted, atol=1e-6)
+    aiding = np.maximum(0.0, -found["noBack.tau_s"] * found["noBack.s"]) * found["noBack.s"]
+    np.testing.assert_allclose(found["noBack.tau_nb"], rig().k_b * aiding, atol=1e-6)
+    assert np.ptp(wanted) > 1.0
+
+
 def test_lead_error_makes_no_power(superset: Plant):
     time = np.arange(0.0, 2.0, 1e-3)
     inputs = Signals(
@@ -219,10 +243,6 @@ FRICTION: dict[str, tuple[dict[str, float], Law]] = {
     "gearboxEffect.rippleFriction": (
         {"a_s": 0.5, "a_c": -0.2, "n": 3.0},
         lambda q: (0.5 * np.sin(3.0 * q["z"]) - 0.2 * np.cos(3.0 * q["z"])) * q["s"],
-    ),
-    "gearboxEffect.rippleOfLoad": (
-        {"a_s": 0.02, "a_c": -0.01, "n": 3.0},
-        lambda q: (0.02 * np.sin(3.0 * q["z"]) - 0.01 * np.cos(3.0 * q["z"])) * q["N"],
     ),
     "screwEffect.positionFriction": (
         {"c1": 2e4, "c2": 300.0, "z_2": 2e-3, "w_2": 5e-4, "c_s": 100.0, "c_c": 50.0, "kappa": 2e3},

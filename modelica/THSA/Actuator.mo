@@ -14,7 +14,7 @@ model Actuator "THSA in closed velocity loop, every loss a law over temperature"
     tau_f=motorEffect.F) "Motor";
   THSA.Gearbox gearbox(tau_f=gearboxEffect.F) "Gearbox";
   THSA.NoBack noBack "No-back device";
-  THSA.Screw screw(e=contactEffect.e, v_e=contactEffect.v_e, k_e=contactEffect.k_e) "Roller screw";
+  THSA.Screw screw(e=contactEffect.e, v_e=contactEffect.v_e, k_e=contactEffect.k_e, tau_f=shaftEffect.tau) "Roller screw";
   THSA.Nut nut(F_f=screwEffect.F) "Nut";
   THSA.Stabilizer stabilizer "Stabilizer";
   THSA.VelocitySensor sensor "Velocity sensor";
@@ -30,6 +30,8 @@ model Actuator "THSA in closed velocity loop, every loss a law over temperature"
   replaceable THSA.Effects.NoFriction gearboxEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
     constrainedby THSA.Interfaces.FrictionEffect
     "Slot: friction and torques at the gearbox's output shaft";
+  replaceable THSA.Effects.NoTorque shaftEffect constrainedby THSA.Interfaces.ShaftEffect
+    "Slot: torques at the screw's shaft";
   replaceable THSA.Effects.NoContact contactEffect constrainedby THSA.Interfaces.ContactEffect
     "Slot: contact of screw and nut";
   replaceable THSA.Effects.NoFriction screwEffect(v(unit="m/s"), z(unit="m"), N(unit="N"), F(unit="N"))
@@ -77,6 +79,9 @@ equation
   gearboxEffect.s = gearbox.friction.s;
   gearboxEffect.z = gearbox.flange_b.phi;
   gearboxEffect.N = noBack.tau_s;
+  shaftEffect.phi = screw.flange_a.phi;
+  shaftEffect.w = noBack.w;
+  shaftEffect.T = screw.T_c;
   contactEffect.phi = screw.flange_a.phi;
   contactEffect.w = noBack.w;
   contactEffect.delta = screw.delta;

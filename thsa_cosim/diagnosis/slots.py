@@ -19,6 +19,7 @@ SLOT = re.compile(
 #: Per interface the connector variables that an effect reads, those that it gives, and the scales' variables.
 INPUTS: Mapping[str, tuple[str, ...]] = {
     "FrictionEffect": ("v", "s", "z", "N"),
+    "ShaftEffect": ("phi", "w", "T"),
     "ContactEffect": ("phi", "w", "delta", "v_s"),
     "HeatingEffect": ("P",),
     "TorqueConstantEffect": ("i_q",),
@@ -27,6 +28,7 @@ INPUTS: Mapping[str, tuple[str, ...]] = {
 }
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "FrictionEffect": ("F",),
+    "ShaftEffect": ("tau",),
     "ContactEffect": ("e", "v_e", "k_e"),
     "HeatingEffect": ("g_R", "g_psi"),
     "TorqueConstantEffect": ("g_t", "g_e"),
@@ -35,6 +37,7 @@ OUTPUTS: Mapping[str, tuple[str, ...]] = {
 }
 SCALES: Mapping[str, Mapping[str, str]] = {
     "FrictionEffect": {"V": "v", "Z": "z", "F": "N"},
+    "ShaftEffect": {"F": "T"},
     "ContactEffect": {},
     "HeatingEffect": {"P": "P"},
     "TorqueConstantEffect": {"I": "i_q"},

@@ -16,15 +16,10 @@ def ripple_friction(p: Values, at: Connectors) -> FloatArray:
     return ripple(p, at) * at["s"]
 
 
-def ripple_of_load(p: Values, at: Connectors) -> FloatArray:
-    """The same in proportion to the load."""
-    return ripple(p, at) * at["N"]
-
-
-def _parameters(dimension: str, typical: float) -> tuple[EffectParameter, ...]:
+def _parameters(s: str, c: str, dimension: str, typical: float) -> tuple[EffectParameter, ...]:
     return (
-        EffectParameter("a_s", dimension, typical, "amplitude, sine part"),
-        EffectParameter("a_c", dimension, typical, "amplitude, cosine part"),
+        EffectParameter(s, dimension, typical, "amplitude, sine part"),
+        EffectParameter(c, dimension, typical, "amplitude, cosine part"),
         EffectParameter(
             "n",
             "W",
@@ -39,20 +34,20 @@ def _parameters(dimension: str, typical: float) -> tuple[EffectParameter, ...]:
     )
 
 
+_PLACES = ("gearbox", "guide")
 EFFECT = Effect(
     name="screw-ripple",
     title="Ripple of the screw with its angle",
-    physics="torque, friction or share of the load a sin(n phi_g + phase), or a lead error of the same form",
+    physics="torque, share of the load's torque or friction a sin(n phi_g + phase), or a lead error of the same form",
     source="Mei, Tsutsumi, Tao, Sun, Mechanism and Machine Theory 38 (2003); ISO 3408-3 (lead deviation)",
     signature="periodic in the screw's angle: in the current (torque, friction) or in position (lead)",
     variants=(
-        Variant("FrictionEffect", "Ripple", _parameters("F", 0.01), ("gearbox", "guide"), ripple),
+        Variant("FrictionEffect", "Ripple", _parameters("a_s", "a_c", "F", 0.01), _PLACES, ripple),
         Variant(
-            "FrictionEffect", "RippleFriction", _parameters("F", 0.01), ("gearbox", "guide"), ripple_friction
+            "FrictionEffect", "RippleFriction", _parameters("a_s", "a_c", "F", 0.01), _PLACES, ripple_friction
         ),
-        Variant(
-            "FrictionEffect", "RippleOfLoad", _parameters("1", 0.01), ("gearbox", "guide"), ripple_of_load
-        ),
-        Variant("ContactEffect", "LeadError", _parameters("m", 2e-06)),
+        Variant("ShaftEffect", "TorqueRipple", _parameters("a_s", "a_c", "F", 0.01)),
+        Variant("ShaftEffect", "TorqueRipple", _parameters("c_s", "c_c", "1", 0.01)),
+        Variant("ContactEffect", "LeadError", _parameters("a_s", "a_c", "m", 2e-06)),
     ),
 )

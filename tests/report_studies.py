@@ -291,6 +291,22 @@ def diagnose_result() -> dict[str, Any]:
             | {"decision": "not testable", "reason": "too little excitation"},
         ],
         "not_testable": [{"name": "winding-self-heating", "reason": "too little excitation"}],
+        "equivalence": [{"names": ["stribeck:motor", "stribeck:gearbox"], "angle_deg": 0.82}],
+        "empirical": {
+            "slot": "screw",
+            "terms": [
+                {"slot": "screw", "term": "|N| sgn(v)", "coefficient": 0.031, "unit": "1", "stderr": 0.002},
+                {
+                    "slot": "motor",
+                    "term": "v |v|",
+                    "coefficient": 2e-6,
+                    "unit": "N.m.s2/rad2",
+                    "stderr": 1e-7,
+                },
+            ],
+            "held_out_gain": 5120.0,
+            "added": False,
+        },
         "balance": [
             {
                 "equation": "screw contact",

@@ -66,7 +66,8 @@ def test_an_effect_says_what_it_is_and_has_its_modelica_class(effect: Effect):
 
 def test_every_slot_has_candidates_with_names_and_variables_of_their_own(slots: tuple[Slot, ...]):
     assert {s.name for s in slots} == {
-        "inverter", "winding", "torque", "motor", "gearbox", "shaft", "contact", "screw", "currentSensor", "velocitySensor"
+        "inverter", "winding", "torque", "motor", "gearbox", "shaft", "contact", "screw",
+        "currentSensor", "velocitySensor"
     }  # fmt: skip
     made = candidates_of(EFFECTS.values(), slots, {})
     assert {c.slot.name for c in made} == {s.name for s in slots}

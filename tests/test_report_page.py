@@ -189,11 +189,17 @@ def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(diag
         in summary
     )
     assert "largest error falls from 5 × the sensor's noise to 1.05 × noise" in summary
-    assert "2 % of the repeatable residual is left unexplained." in summary
+    assert "2 % of the repeatable residual is left in the worst signal." in summary
     errors = table_of(page, "Errors before and after")
     assert cells(errors, "after / noise") == ["1.05", "1.05"]
     assert cells(errors, "unit") == ["m/s", "m/s"]
     assert cells(table_of(page, "The residual by balance equation"), "at fault") == ["yes", "no"]
+    alike = table_of(page, "Effects that would look alike in these recordings")
+    assert cells(alike, "effects") == ["stribeck:motor and stribeck:gearbox"]
+    assert cells(alike, "principal angle [deg]") == ["0.82"]
+    law = table_of(page, "Empirical law of what no effect explains ± one standard error")
+    assert cells(law, "slot") == ["screw", "motor"]
+    assert cells(law, "coefficient") == ["0.0310 ± 0.0020", "(2.00 ± 0.10)e-6"]
     found = plots(page)
     scored = table_of(page, "Effects that were fitted and scored on held-out recordings")
     assert cells(scored, "decision") == ["accepted", "rejected"]

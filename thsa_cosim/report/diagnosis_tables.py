@@ -25,7 +25,7 @@ def sentence(content: Content) -> str:
             text += f" These recordings cannot tell it from {', '.join(rivals)}."
         return text
     text = "Structure is left that no effect of the catalogue explains"
-    share = f" ({100 * content['unexplained']:.0f} % of the repeatable residual)"
+    share = f" ({100 * content['unexplained']:.0f} % of the repeatable residual in the worst signal)"
     return text + share + (f"; added all the same: {found}." if found else ".")
 
 
@@ -106,7 +106,7 @@ def empirical_law(content: Content) -> list[str]:
     if law is None:
         return []
     terms = " + ".join(
-        f"({number(t['coefficient'], 3)} +- {number(t['stderr'], 1)} {t['unit']}) {t['term']}"
+        f"({number(t['coefficient'], 3)} +- {number(t['stderr'], 1)}{_unit(t['unit'])}) {t['term']} at {t['slot']}"
         for t in law["terms"]
     )
     fate = (
@@ -115,9 +115,13 @@ def empirical_law(content: Content) -> list[str]:
         else "empirical = true in [diagnose] adds it to the model."
     )
     return [
-        f"Empirical law in the slot {law['slot']}, which describes and does not explain: {terms}; held-out gain"
+        f"Empirical law, which describes and does not explain: {terms}; held-out gain"
         f" {number(law['held_out_gain'], 3)} variances of the noise. {fate}"
     ]
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
 
 
 def _alike(content: Content) -> list[str]:

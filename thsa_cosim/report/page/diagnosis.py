@@ -40,7 +40,10 @@ def verdict(result: Json) -> tuple[Block, ...]:
     facts = []
     if result.get("unexplained") is not None:
         facts.append(
-            ("left", f"{percent(result['unexplained'])} of the repeatable residual is left unexplained.")
+            (
+                "left",
+                f"{percent(result['unexplained'])} of the repeatable residual is left in the worst signal.",
+            )
         )
     alike = [f"{e['name']} from {listing(e['equivalent'])}" for e in effects if e.get("equivalent")]
     if alike:
@@ -157,6 +160,12 @@ def candidates(part: Part) -> Section | None:
         rows = [(text_cell(s["name"]), text_cell(s.get("reason", ""))) for s in skipped]
         columns = (Column("effect", numeric=False), Column("why not", numeric=False))
         blocks.append(Table("Effects that these recordings cannot test", columns, rows))
+    alike: list[Json] = result.get("equivalence", [])
+    if alike:
+        rows = [(text_cell(listing(c["names"])), number_cell(c["angle_deg"], 2)) for c in alike]
+        columns = (Column("effects", numeric=False), Column("principal angle [deg]"))
+        note = "At an ordinary size; in the first round. The angle is between what they do to the signals."
+        blocks.append(Table("Effects that would look alike in these recordings", columns, rows, note))
     return Section(f"{part.prefix}candidates", "Effects that were weighed", tuple(blocks)) if blocks else None
 
 

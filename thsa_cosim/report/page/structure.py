@@ -9,7 +9,8 @@ import numpy as np
 from thsa_cosim.report.page.chart import AFTER, BEFORE, RESIDUAL, Chart
 from thsa_cosim.report.page.content import Block, Cell, Column, Figure, Fold, Section, Table
 from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.text import count, number_cell, percent, text_cell
+from thsa_cosim.report.page.text import count, number_cell, percent, plus_minus, text_cell
+from thsa_cosim.report.tables import number
 from thsa_cosim.signals import FloatArray
 
 STRUCTURE = "structure.csv"
@@ -61,7 +62,34 @@ def structure(part: Part) -> Section | None:
         blocks.append(
             Fold(f"Residual of {channel} over {count(len(own), 'variable')}, the clearest first", (figure,))
         )
+    law: Json | None = (part.result or {}).get("empirical")
+    if law:
+        blocks.append(_law_table(law))
     return Section(f"{part.prefix}structure", "On what the residual depends", tuple(blocks))
+
+
+def _law_table(law: Json) -> Table:
+    columns = [Column("slot", numeric=False), Column("term", numeric=False), Column("coefficient")]
+    columns += [Column("unit", numeric=False)]
+    rows = [
+        (
+            text_cell(t["slot"]),
+            text_cell(t["term"]),
+            Cell(plus_minus(t["coefficient"], t.get("stderr")), t["coefficient"]),
+            text_cell(t.get("unit", "")),
+        )
+        for t in law["terms"]
+    ]
+    fate = (
+        "added to the model"
+        if law.get("added")
+        else "not added to the model (diagnose.empirical = true adds it)"
+    )
+    note = (
+        f"v, z, N: speed, position and load in the slot; held-out gain {number(law.get('held_out_gain'), 3)} variances"
+        f" of the noise; {fate}. A law describes and does not explain."
+    )
+    return Table("Empirical law of what no effect explains ± one standard error", columns, rows, note)
 
 
 def _shares(part: Part, balance: list[Json]) -> Figure:

@@ -11,6 +11,7 @@ from thsa_cosim.batch import Job, Outcome, Status
 from thsa_cosim.costs.channels import Channel
 from thsa_cosim.diagnosis.bench import Bench, Trial
 from thsa_cosim.diagnosis.fit import columns, refine
+from thsa_cosim.diagnosis.levels import Levels
 from thsa_cosim.diagnosis.unknowns import Unknown, Unknowns
 from thsa_cosim.identify.problem import Case
 from thsa_cosim.signals import Signals
@@ -162,3 +163,38 @@ def test_unknowns_of_a_temperature_reach_only_its_recordings():
     assert unknowns.named(unknowns.start)["L"] == 2e-3
     np.testing.assert_array_equal(unknowns.clip(np.array([99.0, -99.0, 1.0])), [10.0, -10.0, 1.0])
     assert unknowns.precision.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_channel_is_weighed_by_what_the_model_leaves_in_it():
+    lacking = Unknowns(FREE.members[:2])  # no offset
+    own = bench()
+    fit = refine(own, lacking, lacking.start)
+    assert fit is not None
+    rms = float(np.sqrt(np.mean(fit.residual**2)))
+    assert rms > 2.0
+    levels = Levels(own)
+    weighed, held = levels.weigh(fit)
+    assert own.weights["y"] == pytest.approx(1.0 / rms)
+    assert np.sqrt(np.mean(weighed.residual**2)) == pytest.approx(1.0, rel=1e-3)
+    assert held is not None
+    plain = own.residuals(lacking, weighed.vector[None, :], "validate")[0] * rms
+    np.testing.assert_allclose(levels.plain(held, "validate"), plain)
+    assert levels.left(held) == pytest.approx(rms**2, rel=0.3)
+
+
+def test_weights_return_to_one_with_the_right_model_and_rescale_what_they_are_compared_with():
+    own = bench()
+    wrong = refine(own, Unknowns(FREE.members[:2]), FREE.start[:2])
+    assert wrong is not None
+    levels = Levels(own)
+    _, held = levels.weigh(wrong)
+    assert held is not None
+    levels.base_held = held
+    plain = levels.plain(held, "validate")
+    right = refine(own, FREE, FREE.start)
+    assert right is not None
+    fit, _ = levels.weigh(right)
+    assert own.weights["y"] == pytest.approx(1.0, abs=0.1)
+    np.testing.assert_allclose(levels.plain(levels.base_held, "validate"), plain)
+    again, _ = levels.weigh(fit)
+    assert again is fit, "nothing changed, so nothing is fitted"

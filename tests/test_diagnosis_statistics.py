@@ -9,7 +9,7 @@ from scipy import stats
 
 from thsa_cosim.diagnosis.fit import Fit
 from thsa_cosim.diagnosis.scan import wave_numbers
-from thsa_cosim.diagnosis.structure import block_gains, consistency, errors, structure
+from thsa_cosim.diagnosis.structure import block_gains, consistency, errors, structure, worst_share
 from thsa_cosim.diagnosis.threshold import largest_gains, probability, threshold
 from thsa_cosim.diagnosis.unknowns import Unknown, Unknowns
 
@@ -94,6 +94,33 @@ def test_gains_by_blocks_of_time_say_how_sure_a_gain_is():
     other = RNG.standard_normal(10000)
     assert abs(consistency(block_gains(own, worse, other))) < 4.0
     assert consistency(np.array([3.0])) == 0.0
+
+
+def test_mean_sees_an_effect_in_few_blocks_and_ranks_one_that_few_blocks_outweigh():
+    noise = RNG.standard_normal(60)
+    seldom = np.where(np.arange(60) < 14, 100.0, noise)
+    assert consistency(seldom) > 3.0
+    outweighed = np.where(np.arange(60) < 6, -9.0, 1.0 + 0.1 * noise)
+    assert outweighed.mean() < 0.1
+    assert consistency(outweighed) > 3.0
+    assert max(consistency(RNG.standard_normal(60)) for _ in range(20)) < 4.0
+    assert consistency(-outweighed) < 3.0
+
+
+def test_share_that_is_left_is_that_of_the_worst_channel():
+    own = trials(20000)
+    smooth = np.sin(2 * np.pi * 1.5 * np.arange(20000) * 1e-3) * np.sqrt(2.0)
+
+    def residual(v: float, i: float) -> np.ndarray:
+        return np.concatenate([v * smooth, i * smooth]) + RNG.standard_normal(40000)
+
+    before = residual(10.0, 2.0)
+    assert worst_share(own, before, residual(0.0, 1.0)) == pytest.approx(0.25, rel=0.1)
+    assert worst_share(own, before, residual(5.0, 0.0)) == pytest.approx(0.25, rel=0.1)
+    assert worst_share(own, before, residual(0.0, 0.0)) < 0.02
+    assert worst_share(own, before, residual(20.0, 0.0)) == 1.0
+    # Where there was hardly any structure, a share of it says little.
+    assert worst_share(own, residual(10.0, 0.1), residual(0.0, 0.1)) < 0.1
 
 
 def test_a_ripple_over_position_is_found_by_its_wave_number():

@@ -7,28 +7,25 @@ effect must still be needed beside the others.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from thsa_cosim.diagnosis.bench import Bench, Trial
+from thsa_cosim.diagnosis.bench import Bench
 from thsa_cosim.diagnosis.candidate import Candidate
 from thsa_cosim.diagnosis.fit import Fit, refine
+from thsa_cosim.diagnosis.gates import (
+    SIGMAS,
+    SMALLEST_STRUCTURE,
+    insignificant,
+    near_best,
+    objection,
+    out_of_range,
+)
 from thsa_cosim.diagnosis.levels import Levels
 from thsa_cosim.diagnosis.score import Scored, go_on, polish, score
 from thsa_cosim.diagnosis.screen import Proposal, screen, unknowns_of
-from thsa_cosim.diagnosis.structure import block_gains, consistency, structures
+from thsa_cosim.diagnosis.structure import block_gains, consistency
 from thsa_cosim.diagnosis.threshold import largest_gains, probability, threshold
 from thsa_cosim.diagnosis.unknowns import Unknowns
 from thsa_cosim.signals import FloatArray
 
-#: An effect must be this many standard errors from nothing, and its held-out gain from chance.
-SIGMAS = 3.0
-#: The share of the structure left that a first and a further effect must explain on the held-out recordings.
-FIRST_SHARE, NEXT_SHARE = 0.15, 0.2
-#: A further effect must explain this share of what the declared model left in some channel, or it may be the misfit of
-#: the first one.
-TOTAL_SHARE = 0.02
-#: Structure below this many standard deviations of the noise (rms over all channels) is not worth an effect.
-SMALLEST_STRUCTURE = 0.08
 #: Rivals that leave less than this share of the gain unexplained cannot be told apart.
 TIE_SHARE = 0.005
 #: How many effects are refined after each screening, if they promise at least this share of the best one's gain.
@@ -36,9 +33,6 @@ REFINED, WORTH = 6, 0.03
 #: Once an effect leaves no structure, only those that promise this share of its gain are refined as rivals; and only
 #: those that reach this share of the best gain in two iterations are refined further.
 RIVAL_WORTH = 0.3
-
-#: If the best candidate is not believed, others are tried that gain this share of what it does, at most so many.
-NEAR, MOST_TRIED = 0.5, 4
 
 Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
 Say = Callable[[str], None]
@@ -165,12 +159,12 @@ def _choose(
     """The effect to accept, fitted with all parameters, if any; why each that was tried was not, "" for it."""
     objections: list[str] = []
     doubtful: Scored | None = None
-    for one in _near_best(scored):
-        why = _objection(bench, levels, held, one, limit, first)
+    for one in near_best(scored):
+        why = objection(bench, levels, held, one, limit, first)
         if not why:
             say(f"fitting {one.candidate.name} with all parameters")
             one = polish(bench, one, current, held)
-            why = _insignificant(one)
+            why = insignificant(one)
             if not why and (name := out_of_range(one.fit)):
                 why = f"{one.candidate.name}: it drives the declared parameter {name} to the end of its range"
                 doubtful = doubtful or one  # another effect that is still missing may do that
@@ -216,57 +210,6 @@ def _refine_best(
     return sorted(scored, key=lambda s: -s.held_out_gain)
 
 
-def _near_best(scored: Sequence[Scored]) -> list[Scored]:
-    """Those that come near the best one: if that cannot be believed, one of them may take its place."""
-    near = [s for s in scored[1:] if s.held_out_gain >= NEAR * scored[0].held_out_gain]
-    return [*scored[:1], *near][:MOST_TRIED]
-
-
-def _objection(bench: Bench, levels: Levels, held: FloatArray, one: Scored, limit: float, first: bool) -> str:
-    """Why the held-out recordings do not ask for an effect, or ""."""
-    wanted = FIRST_SHARE if first else NEXT_SHARE
-    name = one.candidate.name
-    if one.fit_gain < limit or one.held_out_gain < limit:
-        return f"{name} gains no more than chance on the held-out recordings"
-    if one.consistency < SIGMAS:
-        return f"{name}: its held-out gain is within {SIGMAS:g} standard errors of chance"
-    if levels.left(held) < SMALLEST_STRUCTURE**2:
-        return "what is left is too small against the noise to be worth an effect"
-    if one.share < wanted:
-        return f"{name} explains {100 * one.share:.0f} % of what is left, less than {100 * wanted:.0f} %"
-    if _explained(bench.of("validate"), levels.base_held, held, one.validate) < TOTAL_SHARE:
-        return f"{name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left"
-    return ""
-
-
-def _explained(trials: Sequence[Trial], base: FloatArray, before: FloatArray, after: FloatArray) -> float:
-    """Largest share over the channels of what the declared model left (``base``) that a step explains."""
-    whole, first, last = (structures(trials, residual) for residual in (base, before, after))
-    return max((first[name] - last[name]) / max(whole[name], SMALLEST_STRUCTURE**2) for name in whole)
-
-
-def _insignificant(choice: Scored) -> str:
-    """Why a fit cannot be told from a model without the effect, or ""."""
-    fit = choice.fit
-    inflation = max(1.0, fit.misfit / fit.residual.size)
-    stderr = fit.stderr(inflation)
-    sizes = []
-    for p in choice.candidate.coefficients:
-        k = fit.unknowns.names.index(p.variable)
-        sizes.append(abs(fit.vector[k] - p.neutral) / max(stderr[k], 1e-300))
-    if max(sizes) < SIGMAS:
-        return f"{choice.candidate.name}: the interval of its coefficient includes zero"
-    return ""
-
-
-def out_of_range(fit: Fit) -> str:
-    """Name of a declared parameter that a fit drives to the end of its range, or ""."""
-    for u, x in zip(fit.unknowns.members, fit.vector, strict=True):
-        if u.declared and (x <= u.lower or x >= u.upper):
-            return u.name
-    return ""
-
-
 def _prune(
     bench: Bench,
     unknowns: Unknowns,
@@ -282,7 +225,7 @@ def _prune(
             kept = [s for s in accepted if s is not dropped]
             members = [u for s in kept for u in unknowns_of(s.candidate, s.proposal.shapes)]
             fewer = unknowns.with_members(list({u.name: u for u in members}.values()))
-            vector = np.array([current.vector[current.unknowns.names.index(n)] for n in fewer.names])
+            vector = current.at(fewer.names)
             fit = refine(bench, fewer, vector, iterations=6, enough=3.0)
             validate = None if fit is None else bench.residuals(fewer, fit.vector[None, :], "validate")[0]
             if fit is None or validate is None:

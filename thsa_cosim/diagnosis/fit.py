@@ -3,6 +3,7 @@
 Levenberg (1944), Marquardt (1963); what is known beforehand enters as one more residual per unknown.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,10 @@ class Fit:
     steps: FloatArray
     cost: float
     converged: bool
+
+    def at(self, names: Sequence[str]) -> FloatArray:
+        """(m,) fitted values of the named unknowns."""
+        return np.asarray(self.vector[self.unknowns.index(names)])
 
     @property
     def misfit(self) -> float:

@@ -127,7 +127,7 @@ class _Closing:
             notes += self.box.notes
         if accepted:
             wider = extended_unknowns(self.unknowns, accepted)
-            hint = np.array([found.final.vector[found.final.unknowns.names.index(n)] for n in wider.names])
+            hint = found.final.at(wider.names)
             if self.box is None:
                 self.say(f"exporting the model with {', '.join(s.candidate.name for s in accepted)}")
                 assert self.spec.model is not None
@@ -200,7 +200,7 @@ class _Closing:
             self.folder, self.spec.model, self.spec.package, added, terms.final
         )
         wider = extended_unknowns(self.unknowns, added)
-        hint = np.array([terms.final.vector[terms.final.unknowns.names.index(n)] for n in wider.names])
+        hint = terms.final.at(wider.names)
         return model, extended, self._identify(extended, wider, [hint], added)
 
     def _identify(

@@ -36,10 +36,6 @@ class Scored:
         """The candidate."""
         return self.proposal.candidate
 
-    def parameter(self, variable: str) -> float:
-        """Fitted value of one of its parameters."""
-        return float(self.fit.vector[self.fit.unknowns.names.index(variable)])
-
 
 def score(
     bench: Bench, current: Fit, held: FloatArray, proposal: Proposal, iterations: int = 2

@@ -84,7 +84,7 @@ def separating_experiment(
 def _rivals(found: Attribution) -> tuple[Scored, Scored] | None:
     """The first accepted effect and what is nearest to it: a rival, else the best of the other effects."""
     winner = found.rounds[0].accepted if found.rounds else None
-    if winner is None:
+    if winner is None or winner not in found.accepted:
         return None
     others = [s for s in found.rounds[0].scored if s.candidate.effect.name != winner.candidate.effect.name]
     second = next(iter((*found.rivals, *others)), None)

@@ -66,20 +66,27 @@ def judged(found: Attribution) -> tuple[Judged, ...]:
     for number, one in enumerate(found.rounds, start=1):
         refined = {id(s.proposal): s for s in one.scored}
         seen: set[str] = set()
-        ordered = sorted(one.proposals, key=lambda p: (id(p) not in refined, -p.gain))
+        winner = None if one.accepted is None else one.accepted.proposal
+        ordered = sorted(one.proposals, key=lambda p: (p is not winner, id(p) not in refined, -p.gain))
         for proposal in ordered:
             key = proposal.candidate.key
             if key in seen:
                 continue
             seen.add(key)
-            made.append(_judge(one, number, proposal, refined.get(id(proposal)), rivals))
+            made.append(_judge(found, one, number, proposal, refined.get(id(proposal)), rivals))
     return tuple(made)
 
 
-def _judge(one: Round, number: int, proposal: Proposal, scored: Scored | None, rivals: set[str]) -> Judged:
+def _judge(
+    found: Attribution,
+    one: Round,
+    number: int,
+    proposal: Proposal,
+    scored: Scored | None,
+    rivals: set[str],
+) -> Judged:
     candidate = proposal.candidate
-    winner = one.accepted
-    accepted = winner is not None and winner.proposal is proposal
+    accepted = any(s.proposal is proposal for s in found.accepted)
     values = _values(proposal, scored)
     gain = proposal.gain if scored is None else scored.fit_gain
     decision, reason = "not refined", "promises no more than chance"
@@ -114,6 +121,8 @@ def _objection(one: Round, scored: Scored) -> str:
     tried = dict(zip(map(id, one.scored), one.objections, strict=False))
     if tried.get(id(scored)):
         return tried[id(scored)]
+    if one.accepted is not None and one.accepted.proposal is scored.proposal:
+        return "was accepted and dropped again, see the notes"
     return "explains the held-out recordings less well" if one.accepted else one.objections[0]
 
 

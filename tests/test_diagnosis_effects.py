@@ -237,8 +237,13 @@ FRICTION: dict[str, tuple[dict[str, float], Law]] = {
     ),
     "motorEffect.windage": ({"b_q": 2e-5}, lambda q: 2e-5 * q["v"] ** 2 * q["s"]),
     "motorEffect.cogging": (
-        {"a_s": 0.02, "a_c": 0.01, "n": 24.0},
-        lambda q: 0.02 * np.sin(24.0 * q["z"]) + 0.01 * np.cos(24.0 * q["z"]),
+        {"a_s": 0.02, "a_c": 0.01, "a_s2": 0.005, "a_c2": -0.004, "n": 24.0},
+        lambda q: (
+            0.02 * np.sin(24.0 * q["z"])
+            + 0.01 * np.cos(24.0 * q["z"])
+            + 0.005 * np.sin(48.0 * q["z"])
+            - 0.004 * np.cos(48.0 * q["z"])
+        ),
     ),
     "gearboxEffect.rippleFriction": (
         {"a_s": 0.5, "a_c": -0.2, "n": 3.0},

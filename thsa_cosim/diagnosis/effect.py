@@ -90,6 +90,7 @@ class Variant:
 
     ``block`` and ``interface`` are class names within ``THSA.Effects`` and ``THSA.Interfaces`` (or qualified);
     ``slots`` restricts it to slots of these names (without the ending ``Effect``), None: all of the interface.
+    ``beside``: offered only once another variant of the block is in the model, with whose shape parameters it acts.
     ``law``: the block's equation, for FMUs without source (`diagnosis.blackbox`); None: not for those.
     """
 
@@ -98,6 +99,7 @@ class Variant:
     parameters: tuple[EffectParameter, ...]
     slots: tuple[str, ...] | None = None
     law: Law | None = None
+    beside: bool = False
 
     @property
     def component(self) -> str:

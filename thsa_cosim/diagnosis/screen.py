@@ -70,16 +70,20 @@ def unknowns_of(candidate: Candidate, shapes: Mapping[str, float]) -> tuple[Unkn
     return tuple(made)
 
 
-def shape_starts(candidate: Candidate, scanned: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
-    """Every combination of the starts of the candidate's shape parameters; ``scanned`` adds to them by key."""
+def shape_starts(
+    candidate: Candidate, scanned: Mapping[str, Sequence[float]], known: Mapping[str, float]
+) -> list[dict[str, float]]:
+    """Every combination of the starts of the candidate's shape parameters; ``scanned`` adds to them by slot.
+
+    A shape that is in the model already (``known``, by variable) keeps its value.
+    """
     names, choices = [], []
     for p in candidate.parameters:
         if p.role == "shape":
             further = scanned.get(candidate.slot.name, ()) if p.scanned else ()
             names.append(p.name)
-            choices.append(
-                tuple(dict.fromkeys((*p.starts, *(w for w in further if p.lower <= w <= p.upper))))
-            )
+            starts = dict.fromkeys((*p.starts, *(w for w in further if p.lower <= w <= p.upper)))
+            choices.append((known[p.variable],) if p.variable in known else tuple(starts))
     return [dict(zip(names, combination, strict=True)) for combination in itertools.product(*choices)]
 
 
@@ -90,8 +94,12 @@ def screen(
     scanned: Mapping[str, Sequence[float]],
 ) -> list[Proposal]:
     """All proposals, best first; a candidate that cannot be simulated is left out."""
+    known = dict(zip(base.unknowns.names, base.vector.tolist(), strict=True))
     rows: list[tuple[Candidate, dict[str, float]]] = [
-        (candidate, shapes) for candidate in candidates for shapes in shape_starts(candidate, scanned)
+        (candidate, shapes)
+        for candidate in candidates
+        if not candidate.variant.beside or all(p.variable in known for p in candidate.shapes)
+        for shapes in shape_starts(candidate, scanned, known)
     ]
     variables = {p.variable: p for c in candidates for p in c.parameters}
     own = [

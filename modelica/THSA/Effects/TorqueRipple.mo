@@ -7,7 +7,8 @@ block TorqueRipple "Torque of the screw that varies over its turn"
   parameter Real c_c(unit="1") = 0 "Amplitude as a share of the contact's torque, cosine part";
   parameter Real n(unit="1") = 1 "Periods per revolution";
 equation
-  tau = (a_s + c_s*T)*sin(n*phi) + (a_c + c_c*T)*cos(n*phi);
+  tau = (if a_s > 0 or a_s < 0 or a_c > 0 or a_c < 0 then a_s*sin(n*phi) + a_c*cos(n*phi) else 0)
+    + (if c_s > 0 or c_s < 0 or c_c > 0 or c_c < 0 then c_s*sin(n*phi) + c_c*cos(n*phi) else 0)*T;
   annotation(Documentation(info="<html><p>Part of the torque at the screw, hence of what decides whether the load aids: the no-back
 device drags by it. Shares of the load: an efficiency that varies over the turn.</p></html>"));
 end TorqueRipple;

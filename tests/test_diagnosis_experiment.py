@@ -84,9 +84,8 @@ def find(monkeypatch: pytest.MonkeyPatch, other: Force, **changed: Any) -> Any:
     winner = scored("windage", 1.0, np.zeros(TIME.size))
     rival = scored("stribeck:screw", 2.0, np.full(TIME.size, 0.5))
     attribution = SimpleNamespace(
-        rounds=(SimpleNamespace(accepted=winner, scored=(winner, rival), factors=np.ones(1)),),
+        rounds=(SimpleNamespace(accepted=winner, scored=(winner, rival), rivals=(), factors=np.ones(1)),),
         accepted=(winner,),
-        rivals=(),
     )
     spec = SimpleNamespace(command="v_cmd", load="F_load")
     given = {"found": attribution, "spec": spec} | changed
@@ -138,11 +137,11 @@ def test_nothing_to_separate(monkeypatch: pytest.MonkeyPatch):
     alone = scored("windage", 1.0, np.zeros(TIME.size))
     for rounds in (
         (),
-        (SimpleNamespace(accepted=None, scored=()),),
-        (SimpleNamespace(accepted=alone, scored=(alone,)),),
+        (SimpleNamespace(accepted=None, scored=(), rivals=()),),
+        (SimpleNamespace(accepted=alone, scored=(alone,), rivals=()),),
     ):
         accepted = tuple(r.accepted for r in rounds if r.accepted is not None)
-        found = SimpleNamespace(rounds=rounds, accepted=accepted, rivals=())
+        found = SimpleNamespace(rounds=rounds, accepted=accepted)
         assert find(monkeypatch, loaded, found=found) is None
     assert find(monkeypatch, loaded, spec=SimpleNamespace(command=None, load="F_load")) is None
 

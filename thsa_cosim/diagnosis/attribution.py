@@ -4,7 +4,7 @@ Forward selection (each step against the model so far, declared parameters fitte
 effect must still be needed beside the others.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from thsa_cosim.diagnosis.bench import Bench
@@ -42,7 +42,8 @@ Say = Callable[[str], None]
 class Round:
     """One screening: its threshold, what was proposed, what was refined (best first) and what was decided.
 
-    ``objections``: why each of the first refined ones was not accepted, "" for the one that was. ``factors`` (N,):
+    ``objections``: why each of the first refined ones was not accepted, "" for the one that was. ``rivals``: other
+    effects that explain the held-out recordings as well as the accepted one, within the uncertainty. ``factors`` (N,):
     how the residuals of the fit recordings were weighed.
     """
 
@@ -51,6 +52,7 @@ class Round:
     scored: tuple[Scored, ...]
     accepted: Scored | None
     objections: tuple[str, ...]
+    rivals: tuple[Scored, ...]
     gains: FloatArray
     factors: FloatArray
 
@@ -69,7 +71,6 @@ class Attribution:
     base: Fit
     rounds: tuple[Round, ...]
     accepted: tuple[Scored, ...]
-    rivals: tuple[Scored, ...]
     final: Fit
     base_validate: FloatArray
     final_validate: FloatArray
@@ -100,7 +101,6 @@ def attribute(
     current, current_held = base, held
     rounds: list[Round] = []
     accepted: list[Scored] = []
-    rivals: tuple[Scored, ...] = ()
     for number in range(most):
         if accepted and levels.left(current_held) < SMALLEST_STRUCTURE**2:
             break
@@ -115,11 +115,13 @@ def attribute(
         scored = _refine_best(bench, levels, current, current_held, proposals, limit, say)
         choice, objections = _choose(bench, levels, current, current_held, scored, limit, not accepted, say)
         factors = bench.factors("fit")
-        rounds.append(Round(limit, tuple(proposals), tuple(scored), choice, objections, gains, factors))
+        named = {s.candidate.effect.name for s in accepted}
+        rivals = () if choice is None else _rivals(bench, choice, scored, current, current_held, named)
+        rounds.append(
+            Round(limit, tuple(proposals), tuple(scored), choice, objections, rivals, gains, factors)
+        )
         if choice is None:
             break
-        if not accepted:
-            rivals = _rivals(bench, choice, scored, base, held)
         accepted.append(choice)
         current, reweighed = levels.weigh(choice.fit)
         if reweighed is None:
@@ -138,7 +140,6 @@ def attribute(
         base,
         tuple(rounds),
         tuple(accepted),
-        rivals if accepted and accepted[0] is rounds[0].accepted else (),
         current,
         levels.plain(levels.base_held, "validate"),
         levels.plain(current_held, "validate"),
@@ -244,13 +245,18 @@ def _prune(
 
 
 def _rivals(
-    bench: Bench, winner: Scored, scored: Sequence[Scored], base: Fit, held: FloatArray
+    bench: Bench,
+    winner: Scored,
+    scored: Sequence[Scored],
+    base: Fit,
+    held: FloatArray,
+    named: Collection[str],
 ) -> tuple[Scored, ...]:
-    """Other effects than the first accepted one that explain held-out recordings as well, within the uncertainty."""
+    """Other effects than the accepted one and those ``named`` before that explain held-out recordings as well."""
     rivals: dict[str, Scored] = {}
     for other in scored:
         name = other.candidate.effect.name
-        if name == winner.candidate.effect.name or name in rivals:
+        if name == winner.candidate.effect.name or name in rivals or name in named:
             continue
         if other.held_out_gain < 0.9 * winner.held_out_gain:
             continue

@@ -83,11 +83,12 @@ def separating_experiment(
 
 def _rivals(found: Attribution) -> tuple[Scored, Scored] | None:
     """The first accepted effect and what is nearest to it: a rival, else the best of the other effects."""
-    winner = found.rounds[0].accepted if found.rounds else None
-    if winner is None or winner not in found.accepted:
+    first = found.rounds[0] if found.rounds else None
+    winner = None if first is None else first.accepted
+    if first is None or winner is None or winner not in found.accepted:
         return None
-    others = [s for s in found.rounds[0].scored if s.candidate.effect.name != winner.candidate.effect.name]
-    second = next(iter((*found.rivals, *others)), None)
+    others = [s for s in first.scored if s.candidate.effect.name != winner.candidate.effect.name]
+    second = next(iter((*first.rivals, *others)), None)
     return None if second is None else (winner, second)
 
 

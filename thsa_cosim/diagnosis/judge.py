@@ -27,18 +27,18 @@ def found_effects(found: Attribution, fit: Fit, inflation: float) -> tuple[Found
     for scored in found.accepted:
         merged.setdefault(scored.candidate.effect.name, []).append(scored)
     values = values_of(fit, declared=False, inflation=inflation)
-    rivals = tuple(r.candidate.name for r in found.rivals)
     effects = []
-    for number, members in enumerate(merged.values()):
-        owner = found.rounds[0] if number == 0 else _round_of(found, members[0])
+    for members in merged.values():
+        owner = _round_of(found, members[0])
+        rivals = tuple(r.candidate.name for r in owner.rivals)
         chance = owner.probability(members[0].fit_gain)
         effects.append(
             FoundEffect(
                 name=members[0].candidate.name,
                 title=members[0].candidate.effect.title,
                 parameters=_parameters(members, values),
-                equivalent=rivals if number == 0 else (),
-                probability=(1.0 - chance) / (1 + len(rivals) if number == 0 else 1),
+                equivalent=rivals,
+                probability=(1.0 - chance) / (1 + len(rivals)),
             )
         )
     return tuple(effects)
@@ -62,8 +62,9 @@ def _round_of(found: Attribution, scored: Scored) -> Round:
 def judged(found: Attribution) -> tuple[Judged, ...]:
     """Every candidate's best proposal in each round, most telling first."""
     made: list[Judged] = []
-    rivals = {r.candidate.key for r in found.rivals}
     for number, one in enumerate(found.rounds, start=1):
+        kept = one.accepted is not None and one.accepted in found.accepted
+        rivals = {r.candidate.key for r in one.rivals} if kept else set()
         refined = {id(s.proposal): s for s in one.scored}
         seen: set[str] = set()
         winner = None if one.accepted is None else one.accepted.proposal
@@ -95,9 +96,7 @@ def _judge(
     if _not_testable(proposal, one.threshold):
         decision, reason = "not testable", "too little excitation beside the declared parameters"
     if scored is not None:
-        decision = (
-            "accepted" if accepted else "rival" if number == 1 and candidate.key in rivals else "rejected"
-        )
+        decision = "accepted" if accepted else "rival" if candidate.key in rivals else "rejected"
         reason = ""
         if decision == "rejected":
             reason = _objection(one, scored)

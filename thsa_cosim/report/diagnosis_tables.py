@@ -20,9 +20,9 @@ def sentence(content: Content) -> str:
     found = " and ".join(f"{e['title'][0].lower()}{e['title'][1:]} ({e['name']})" for e in effects)
     if content["verdict"] == "missing-effect":
         text = f"The model lacks {found}."
-        rivals = [name for e in effects for name in e["equivalent"]]
-        if rivals:
-            text += f" These recordings cannot tell it from {', '.join(rivals)}."
+        ties = [f"{e['name']} from {', '.join(e['equivalent'])}" for e in effects if e["equivalent"]]
+        if ties:
+            text += f" These recordings cannot tell {' and '.join(ties)}."
         return text
     text = "Structure is left that no effect of the catalogue explains"
     share = f" ({100 * content['unexplained']:.0f} % of the repeatable residual in the worst signal)"

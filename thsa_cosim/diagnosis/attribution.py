@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from thsa_cosim.diagnosis.bench import Bench
 from thsa_cosim.diagnosis.candidate import Candidate
-from thsa_cosim.diagnosis.fit import Fit, refine
+from thsa_cosim.diagnosis.fit import Fit, cost_of, refine
 from thsa_cosim.diagnosis.gates import (
     SIGMAS,
     SMALLEST_STRUCTURE,
@@ -65,10 +65,12 @@ class Round:
 class Attribution:
     """The declared model's fit, the rounds, the accepted effects in order, and the model with them.
 
+    ``base_cost``: of the declared model's fit without weights, the prior's share included.
     ``base_validate``, ``final_validate`` (N,): held-out residuals of both, in standard deviations of the noise.
     """
 
     base: Fit
+    base_cost: float
     rounds: tuple[Round, ...]
     accepted: tuple[Scored, ...]
     final: Fit
@@ -97,6 +99,7 @@ def attribute(
     base, held = levels.weigh(base)
     if held is None:
         return None
+    base_cost = cost_of(unknowns, base.vector, levels.plain(base.residual, "fit"))
     levels.base_held = held
     current, current_held = base, held
     rounds: list[Round] = []
@@ -138,6 +141,7 @@ def attribute(
         current_held = fallen
     return Attribution(
         base,
+        base_cost,
         tuple(rounds),
         tuple(accepted),
         current,

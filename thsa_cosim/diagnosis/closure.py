@@ -33,24 +33,23 @@ class Identified:
     failures: dict[str, int]
 
 
-def identify_from_drawing(
+def identify_model(
     fmu: Path,
     trials: tuple[Trial, ...],
     unknowns: Unknowns,
-    hints: Sequence[FloatArray],
+    starts: Sequence[FloatArray],
     simulation: SimulationSpec,
     workers: int,
     cluster: str | None,
 ) -> Identified:
-    """Identify ``unknowns`` of an FMU on the fit recordings, from the drawing and from ``hints``; the best counts.
+    """Identify ``unknowns`` of an FMU on the fit recordings from every one of ``starts``; the best fit counts.
 
     StudyError if the FMU cannot be simulated at any start.
     """
     own = with_fmu(trials, fmu)
     with open_runner(simulation, [t.experiment for t in own], workers, cluster) as runner:
         bench = Bench(runner, own)
-        starts = np.array([unknowns.start, *hints])
-        found = bench.residuals(unknowns, starts, "fit")
+        found = bench.residuals(unknowns, np.array(starts), "fit")
         fits: list[Fit] = []
         for residual, vector in zip(found, starts, strict=True):
             known = min((f.cost for f in fits), default=np.inf)

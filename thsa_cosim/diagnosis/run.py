@@ -15,7 +15,7 @@ from thsa_cosim.diagnosis.catalogue import catalogue, choose
 from thsa_cosim.diagnosis.closure import (
     Identified,
     extended_unknowns,
-    identify_from_drawing,
+    identify_model,
     write_extended_model,
 )
 from thsa_cosim.diagnosis.dependence import dependence
@@ -81,8 +81,8 @@ def diagnose(
     box = tested if isinstance(tested, BlackBox) else None
     say("identifying the declared model from the drawing")
     declared = trials if box is None else box.with_effects(())
-    before = identify_from_drawing(
-        scenario.fmu.path, declared, unknowns, (), scenario.simulation, workers, cluster
+    before = identify_model(
+        scenario.fmu.path, declared, unknowns, [unknowns.start], scenario.simulation, workers, cluster
     )
     with open_runner(scenario.simulation, [t.experiment for t in tested.trials], workers, cluster) as runner:
         bench = Bench(runner, tested.trials)
@@ -118,7 +118,7 @@ class _Closing:
 
     def result(self) -> DiagnosisResult:
         """Identify the extended model on its own FMU as the declared one was, and judge both."""
-        scenario, found, before = self.scenario, self.found, self.before
+        scenario, found, before = self.scenario, self.found, self._declared()
         accepted, notes, after = found.accepted, list(found.notes), before
         model: Path | None = None
         extended: Path | None = None
@@ -135,7 +135,7 @@ class _Closing:
                     self.folder, self.spec.model, self.spec.package, accepted, found.final
                 )
             self.say("identifying the extended model from the drawing")
-            after = self._identify(extended or scenario.fmu.path, wider, [hint], accepted)
+            after = self._identify(extended or scenario.fmu.path, wider, [wider.start, hint], accepted)
             if self.box is not None:
                 wrapper = write_wrapped(self.folder, self.box, accepted, after.fit)
         share, verdict = self._verdict(before, after, accepted)
@@ -192,6 +192,16 @@ class _Closing:
             notes=tuple(notes),
         )
 
+    def _declared(self) -> Identified:
+        """The declared model, identified once more if the search came to a better optimum than the drawing led to."""
+        base = self.found.base
+        if self.found.base_cost > self.before.fit.cost - 1.0:
+            return self.before
+        self.say("identifying the declared model from where the search came to")
+        return self._identify(
+            self.scenario.fmu.path, self.unknowns, [self.before.fit.vector, base.vector], ()
+        )
+
     def _with_law(self, terms: Attribution) -> tuple[Path, Path, Identified]:
         """The model with its effects and an empirical law: class, FMU, identified."""
         assert self.spec.model is not None
@@ -201,14 +211,14 @@ class _Closing:
         )
         wider = extended_unknowns(self.unknowns, added)
         hint = terms.final.at(wider.names)
-        return model, extended, self._identify(extended, wider, [hint], added)
+        return model, extended, self._identify(extended, wider, [wider.start, hint], added)
 
     def _identify(
-        self, fmu: Path, unknowns: Unknowns, hints: Sequence[np.ndarray], accepted: Sequence[Scored]
+        self, fmu: Path, unknowns: Unknowns, starts: Sequence[np.ndarray], accepted: Sequence[Scored]
     ) -> Identified:
         trials = self.trials if self.box is None else self.box.with_effects(accepted)
-        return identify_from_drawing(
-            fmu, trials, unknowns, hints, self.scenario.simulation, self.workers, self.cluster
+        return identify_model(
+            fmu, trials, unknowns, starts, self.scenario.simulation, self.workers, self.cluster
         )
 
     def _verdict(

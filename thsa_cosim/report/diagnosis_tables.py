@@ -125,11 +125,13 @@ def _unit(unit: str) -> str:
 
 
 def _alike(content: Content) -> list[str]:
-    """Candidates that would look alike in these recordings, had the unit one of them at an ordinary size."""
+    """What would look like a named effect in these recordings, at an ordinary size; the page has all classes."""
+    named = {e["name"] for e in content["effects"]}
     return [
         f"These recordings could not tell apart at an ordinary size: {', '.join(c['names'])} (principal angle"
         f" {number(c['angle_deg'], 2)} deg)."
         for c in content["equivalence"]
+        if named & set(c["names"])
     ]
 
 

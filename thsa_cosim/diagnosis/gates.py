@@ -17,7 +17,7 @@ SIGMAS = 3.0
 FIRST_SHARE, NEXT_SHARE = 0.15, 0.2
 #: A further effect must explain this share of what the declared model left in some channel, or it may be the misfit of
 #: the first one.
-TOTAL_SHARE = 0.02
+TOTAL_SHARE = 0.1
 #: Structure below this many standard deviations of the noise (rms over all channels) is not worth an effect.
 SMALLEST_STRUCTURE = 0.08
 #: If the best candidate is not believed, others are tried that gain this share of what it does, at most so many.
@@ -43,7 +43,7 @@ def objection(bench: Bench, levels: Levels, held: FloatArray, one: Scored, limit
     if one.share < wanted:
         return f"{name} explains {100 * one.share:.0f} % of what is left, less than {100 * wanted:.0f} %"
     if _explained(bench.of("validate"), levels.base_held, held, one.validate) < TOTAL_SHARE:
-        return f"{name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left"
+        return f"{name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left in any signal"
     return ""
 
 

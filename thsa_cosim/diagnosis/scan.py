@@ -49,7 +49,7 @@ def wave_numbers(
 
 
 def _waves(grid: FloatArray, place: FloatArray) -> np.ndarray:
-    """exp(-i grid place), (m, n): each row is the one before, turned on, which costs a tenth of exponentials."""
+    """exp(-i grid place), (m, n): each row is the one before, turned on, which costs less than exponentials."""
     waves = np.empty((grid.size, place.size), dtype=complex)
     waves[0] = np.exp(-1j * grid[0] * place)
     if grid.size > 1:

@@ -94,7 +94,7 @@ def screen(
     scanned: Mapping[str, Sequence[float]],
 ) -> list[Proposal]:
     """All proposals, best first; a candidate that cannot be simulated is left out."""
-    known = dict(zip(base.unknowns.names, base.vector.tolist(), strict=True))
+    known = base.unknowns.named(base.vector)
     rows: list[tuple[Candidate, dict[str, float]]] = [
         (candidate, shapes)
         for candidate in candidates

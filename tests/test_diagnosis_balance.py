@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from scipy.integrate import quad
 
-from thsa_cosim.diagnosis.balance import close_balances
+from thsa_cosim.diagnosis.explaining.balance import close_balances
 from thsa_cosim.diagnosis.results import Balance
 from thsa_cosim.errors import ScenarioError
 from thsa_cosim.scenario import load_scenario

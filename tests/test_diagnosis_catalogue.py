@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from thsa_cosim.diagnosis import Effect, EffectParameter, catalogue
-from thsa_cosim.diagnosis.candidate import candidates_of
-from thsa_cosim.diagnosis.catalogue import choose
-from thsa_cosim.diagnosis.effect import powers
-from thsa_cosim.diagnosis.empirical import EMPIRICAL
-from thsa_cosim.diagnosis.slots import INPUTS, OUTPUTS, Slot, find_slots
+from thsa_cosim.diagnosis import Effect, EffectParameter, known_effects
+from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
+from thsa_cosim.diagnosis.catalogue.effect import powers
+from thsa_cosim.diagnosis.catalogue.known import choose
+from thsa_cosim.diagnosis.catalogue.slots import INPUTS, OUTPUTS, Slot, find_slots
+from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL
 from thsa_cosim.errors import ModelicaError, ScenarioError
 from thsa_cosim.units import same_dimension
 
@@ -33,7 +33,7 @@ PROMISED = [
     "velocity-sensor-delay",
     "inverter-dead-time",
 ]
-EFFECTS = catalogue()
+EFFECTS = known_effects()
 
 
 @pytest.fixture(scope="module")
@@ -118,16 +118,16 @@ def test_a_model_without_slots_and_an_unknown_effect_are_refused_in_one_sentence
         choose(EFFECTS, ("stribek",), "x.toml: diagnose.effects")
 
 
-def test_effects_of_ones_own_folder_come_beside_the_catalogue(tmp_path: Path):
-    own = (Path(catalogue.__code__.co_filename).parent / "effects" / "windage.py").read_text(encoding="utf-8")
+def test_effects_of_ones_own_folder_come_beside_the_known_effects(tmp_path: Path):
+    own = (Path(known_effects.__code__.co_filename).parent / "effects" / "windage.py").read_text(encoding="utf-8")
     (tmp_path / "mine.py").write_text(own.replace('name="windage"', 'name="mine"'), encoding="utf-8")
-    assert catalogue(tmp_path).keys() == EFFECTS.keys() | {"mine"}
+    assert known_effects(tmp_path).keys() == EFFECTS.keys() | {"mine"}
     (tmp_path / "broken.py").write_text("EFFECT = 1", encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"broken.py: holds no EFFECT"):
-        catalogue(tmp_path)
+        known_effects(tmp_path)
     (tmp_path / "broken.py").write_text("1 +", encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"broken.py: cannot be loaded \(SyntaxError"):
-        catalogue(tmp_path)
+        known_effects(tmp_path)
 
 
 def test_every_interface_has_readers_and_writers():

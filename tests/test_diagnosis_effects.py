@@ -8,9 +8,9 @@ import pytest
 from reference.rig import Rig, rig_at
 from scipy.optimize import brentq
 
-from thsa_cosim.diagnosis import catalogue
-from thsa_cosim.diagnosis.empirical import EMPIRICAL, LIBRARY
-from thsa_cosim.diagnosis.superset import build_superset
+from thsa_cosim.diagnosis import known_effects
+from thsa_cosim.diagnosis.catalogue.superset import build_superset
+from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL, LIBRARY
 from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import Signals
 
@@ -26,7 +26,7 @@ COMMAND = np.interp(TIME, [0.1, 0.3, 0.9, 1.3, 1.7, 1.9], [0.0, SPEED, SPEED, -S
 def superset(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
     pytest.importorskip("rumoca")
     folder = tmp_path_factory.mktemp("superset")
-    effects = [*catalogue().values(), EMPIRICAL]
+    effects = [*known_effects().values(), EMPIRICAL]
     fmu, *_ = build_superset("Actuator", ROOT / "modelica" / "THSA", effects, folder)
     with Plant.open(fmu) as plant:
         yield plant

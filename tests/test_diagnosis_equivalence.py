@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thsa_cosim.diagnosis.equivalence import equivalence, principal_angles
-from thsa_cosim.diagnosis.fit import Fit
-from thsa_cosim.diagnosis.unknowns import Unknown, Unknowns
+from thsa_cosim.diagnosis.choosing.equivalence import equivalence, principal_angles
+from thsa_cosim.diagnosis.fitting.fit import Fit
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 
 N = 400
 BASIS = np.linalg.qr(np.random.default_rng(1).standard_normal((N, 6)))[0]

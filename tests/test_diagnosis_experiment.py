@@ -11,9 +11,9 @@ import pytest
 
 from thsa_cosim.batch import Experiment, Job, Outcome, Status
 from thsa_cosim.costs.channels import Channel
-from thsa_cosim.diagnosis import experiment as room
-from thsa_cosim.diagnosis.bench import Trial
-from thsa_cosim.diagnosis.profiles import Range, input_range, profiles, travel
+from thsa_cosim.diagnosis.explaining import experiment as room
+from thsa_cosim.diagnosis.explaining.profiles import Range, input_range, profiles, travel
+from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.identify.problem import Case
 from thsa_cosim.signals import Signals
 

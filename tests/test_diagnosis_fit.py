@@ -9,10 +9,11 @@ import pytest
 
 from thsa_cosim.batch import Job, Outcome, Status
 from thsa_cosim.costs.channels import Channel
-from thsa_cosim.diagnosis.bench import Bench, Trial
-from thsa_cosim.diagnosis.fit import columns, refine
-from thsa_cosim.diagnosis.levels import Levels
-from thsa_cosim.diagnosis.unknowns import Unknown, Unknowns
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import columns, refine
+from thsa_cosim.diagnosis.fitting.trials import Trial
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
+from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.identify.problem import Case
 from thsa_cosim.signals import Signals
 
@@ -172,7 +173,7 @@ def test_channel_is_weighed_by_what_the_model_leaves_in_it():
     assert fit is not None
     rms = float(np.sqrt(np.mean(fit.residual**2)))
     assert rms > 2.0
-    levels = Levels(own)
+    levels = ChannelWeights(own)
     weighed, held = levels.weigh(fit)
     assert own.weights["y"] == pytest.approx(1.0 / rms)
     assert np.sqrt(np.mean(weighed.residual**2)) == pytest.approx(1.0, rel=1e-3)
@@ -186,7 +187,7 @@ def test_weights_return_to_one_with_the_right_model_and_rescale_what_they_are_co
     own = bench()
     wrong = refine(own, Unknowns(FREE.members[:2]), FREE.start[:2])
     assert wrong is not None
-    levels = Levels(own)
+    levels = ChannelWeights(own)
     _, held = levels.weigh(wrong)
     assert held is not None
     levels.base_held = held

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from thsa_cosim.diagnosis.fit import Fit
-from thsa_cosim.diagnosis.scan import wave_numbers
-from thsa_cosim.diagnosis.structure import block_gains, consistency, errors, structure, worst_share
-from thsa_cosim.diagnosis.threshold import largest_gains, probability, threshold
-from thsa_cosim.diagnosis.unknowns import Unknown, Unknowns
+from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
+from thsa_cosim.diagnosis.choosing.wave_numbers import wave_numbers
+from thsa_cosim.diagnosis.fitting.fit import Fit
+from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, errors, structure, worst_share
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 
 N = 3000
 RNG = np.random.default_rng(2)

@@ -12,9 +12,9 @@ from small_scenario import write_fmu
 
 from thsa_cosim import cli
 from thsa_cosim.draft import draft_from_columns, draft_scenario, find_columns, match_columns, time_column
-from thsa_cosim.draft.columns import FoundColumn, words
 from thsa_cosim.fmu import FmuDescription, Variable, read_description
 from thsa_cosim.fmu.description import DefaultExperiment
+from thsa_cosim.recordings.columns import FoundColumn, words
 from thsa_cosim.scenario import load_scenario
 
 ROOT = Path(__file__).parents[2]

@@ -1,11 +1,10 @@
-"""Commands about models: export a Modelica class, check an FMU."""
+"""The command ``export``: a Modelica class as an FMU."""
 
-import json
 from pathlib import Path
 
 import click
 
-from thsa_cosim.cli.options import PATH, console
+from thsa_cosim.cli.options import PATH
 
 
 @click.command()
@@ -34,23 +33,3 @@ def export(
         model, package=package, fmi=int(fmi), output=output, compiler=compiler, platforms=chosen
     )
     click.echo(str(path))
-
-
-@click.command()
-@click.argument("fmu", type=PATH)
-@click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
-@click.option("-o", "--output", type=PATH, default=None, help="Write the findings as JSON to this file, too.")
-def check(fmu: Path, as_json: bool, output: Path | None) -> None:
-    """Say what an FMU is and what it can be trusted with."""
-    from thsa_cosim.check import check_fmu
-
-    report = check_fmu(fmu)
-    text = json.dumps(report.to_dict(), indent=2)
-    if output is not None:
-        output.write_text(text + "\n", encoding="utf-8")
-    if as_json:
-        click.echo(text)
-    else:
-        from thsa_cosim.report.check import print_check
-
-        print_check(console(), report)

@@ -119,7 +119,9 @@ def test_a_model_without_slots_and_an_unknown_effect_are_refused_in_one_sentence
 
 
 def test_effects_of_ones_own_folder_come_beside_the_known_effects(tmp_path: Path):
-    own = (Path(known_effects.__code__.co_filename).parent / "effects" / "windage.py").read_text(encoding="utf-8")
+    own = (Path(known_effects.__code__.co_filename).parent / "effects" / "windage.py").read_text(
+        encoding="utf-8"
+    )
     (tmp_path / "mine.py").write_text(own.replace('name="windage"', 'name="mine"'), encoding="utf-8")
     assert known_effects(tmp_path).keys() == EFFECTS.keys() | {"mine"}
     (tmp_path / "broken.py").write_text("EFFECT = 1", encoding="utf-8")

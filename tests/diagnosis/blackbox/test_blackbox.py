@@ -23,7 +23,7 @@ from thsa_cosim.fmu import Plant
 from thsa_cosim.scenario import BlackBoxSpec, load_scenario
 from thsa_cosim.signals import Signals
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[3]
 FMU = ROOT / "fmus" / "THSA.fmu"
 NAMES = BlackBoxSpec("v_cmd", "F_load", "v", "x", "w_m", "i_q", "u_q")
 OUTPUTS = ("v", "x", "w_m", "i_q", "u_q")

@@ -14,7 +14,7 @@ from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL
 from thsa_cosim.errors import ModelicaError, ScenarioError
 from thsa_cosim.units import same_dimension
 
-PACKAGE = Path(__file__).parents[1] / "modelica" / "THSA"
+PACKAGE = Path(__file__).parents[3] / "modelica" / "THSA"
 PROMISED = [
     "stribeck",
     "asymmetric-friction",

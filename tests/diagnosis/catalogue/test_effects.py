@@ -14,7 +14,7 @@ from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL, LIBRARY
 from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import Signals
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[3]
 OUTPUTS = ("v", "x", "w_m", "i_q", "u_q")
 TEMPERATURE, LOAD, SPEED = -20.0, 30e3, 6e-3
 TIME = np.arange(2001) * 1e-3

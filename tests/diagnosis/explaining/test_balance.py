@@ -15,7 +15,7 @@ from thsa_cosim.errors import ScenarioError
 from thsa_cosim.scenario import load_scenario
 from thsa_cosim.scenario.formula import parse_formula
 
-FMU = Path(__file__).parents[1] / "fmus" / "THSA.fmu"
+FMU = Path(__file__).parents[3] / "fmus" / "THSA.fmu"
 R, L, KT, J, T_C, B = 1.0, 2e-3, 0.5, 2e-3, 0.05, 1e-4
 NOISE = {"w_m": 0.2, "i_q": 0.05, "u_q": 0.3}
 TIME = np.arange(6000) * 1e-3
@@ -80,7 +80,7 @@ def close(folder: Path, data: pd.DataFrame, *balances: dict, start: float = 9e3)
         *(f'recordings.columns.{n} = {{column = "{c}", unit = "{units[n]}"}}' for n, c in columns.items()),
         "[diagnose]",
         'model = "THSA.Actuator"',
-        f"package = {json.dumps(str(FMU.parents[1] / 'modelica' / 'THSA'))}",
+        f"package = {json.dumps(str(FMU.parents[3] / 'modelica' / 'THSA'))}",
         "[[parameters]]",
         'name = "F_fn"',
         'variable = "nut.F_fn.a0"',

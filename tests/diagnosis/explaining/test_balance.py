@@ -80,7 +80,7 @@ def close(folder: Path, data: pd.DataFrame, *balances: dict, start: float = 9e3)
         *(f'recordings.columns.{n} = {{column = "{c}", unit = "{units[n]}"}}' for n, c in columns.items()),
         "[diagnose]",
         'model = "THSA.Actuator"',
-        f"package = {json.dumps(str(FMU.parents[3] / 'modelica' / 'THSA'))}",
+        f"package = {json.dumps(str(FMU.parents[1] / 'modelica' / 'THSA'))}",
         "[[parameters]]",
         'name = "F_fn"',
         'variable = "nut.F_fn.a0"',

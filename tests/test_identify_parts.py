@@ -16,13 +16,13 @@ from thsa_cosim.identify.interleave import interleave
 from thsa_cosim.identify.over_temperature import fit_laws, values_at
 from thsa_cosim.identify.parameter_set import law_values, parameter_set
 from thsa_cosim.identify.results import ChannelError, Comparison, Estimate, PointResult
-from thsa_cosim.identify.study import MARKER, open_study
 from thsa_cosim.laws import published_law
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.report.parameter_files import modelica_record
 from thsa_cosim.scenario import LawSpec
 from thsa_cosim.signals import Signals
 from thsa_cosim.ssv import ParameterSet
+from thsa_cosim.study import MARKER, open_study
 
 
 def countdown(steps: int):

@@ -39,8 +39,8 @@ def diagnose(options: StudyOptions) -> None:
 
 def _is_complete(scenario: "Scenario", folder: Path) -> bool:
     """Whether the folder holds this very study with its result; InputError if it holds another one."""
-    from thsa_cosim.identify import open_study, study_identity
     from thsa_cosim.report.study import RESULT
+    from thsa_cosim.study import open_study, study_identity
 
     if not (folder / RESULT).is_file():
         return False

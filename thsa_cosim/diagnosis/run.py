@@ -32,9 +32,9 @@ from thsa_cosim.diagnosis.superset import Superset, open_superset
 from thsa_cosim.diagnosis.unknowns import Unknowns
 from thsa_cosim.errors import StudyError
 from thsa_cosim.identify import Comparison as Compared
-from thsa_cosim.identify import ForceBalance, force_balance, open_study, study_identity
-from thsa_cosim.identify.study import describe
+from thsa_cosim.identify import ForceBalance, force_balance
 from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
+from thsa_cosim.study import describe, open_study, study_identity
 
 #: More than this share of some channel's structure left after all effects: something else is missing.
 UNEXPLAINED_SHARE = 0.25

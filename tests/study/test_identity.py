@@ -1,7 +1,7 @@
 """What makes two runs the same study: every key of every kind counts, and files count by their content."""
 
-import json
 import shutil
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import UnionType
@@ -10,18 +10,17 @@ from typing import Annotated, Any, Union, get_args, get_origin
 import pytest
 from small_scenario import toml, valid, write_folder
 
-from thsa_cosim.errors import InputError
 from thsa_cosim.scenario import KINDS, Table, load_scenario, load_study, load_tune
 from thsa_cosim.scenario.schema import StagesTable
 from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.ssv import ParameterSet, write_ssv
-from thsa_cosim.study import MARKER, open_study, stages_identity, study_identity
+from thsa_cosim.study import stages_identity, study_identity
 from thsa_cosim.study.folder import changed
 from thsa_cosim.study.identity import BY_CONTENT, SHOWN_ONLY, flatten
 
 ALL_KINDS: dict[str, type[Table]] = {**KINDS, "tune": TuneTable, "stages": StagesTable}
 #: Keys of a kind that are read off a scenario's table: fewer would mean that the walk below has lost some.
-AT_LEAST = {"identify": 60, "simulate": 38, "diagnose": 90, "tune": 85, "stages": 1}
+AT_LEAST = {"identify": 66, "simulate": 38, "diagnose": 85, "tune": 82, "stages": 1}
 
 
 def tables_in(annotation: Any) -> tuple[type[Table] | None, type | None]:
@@ -112,7 +111,7 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "own").mkdir()
     (tmp_path / "own" / "drag.py").write_text("EFFECT = None")
     start = ParameterSet("start", {"motor.gain": 2.0}, {}, "test")
-    write_ssv(start, tmp_path / "start.ssv")
+    write_ssv(tmp_path / "start.ssv", start)
     return tmp_path
 
 
@@ -137,7 +136,7 @@ EDITS: dict[str, Callable[[Path], None]] = {
     "recordings.fit[cold_2]": lambda f: edit(f / "runs" / "cold_2.csv", "0.2", "0.3"),
     "recordings.validate[check]": lambda f: edit(f / "runs" / "check.csv", "0.2", "0.3"),
     "start values.motor.gain": lambda f: write_ssv(
-        ParameterSet("start", {"motor.gain": 3.0}, {}, "test"), f / "start.ssv"
+        f / "start.ssv", ParameterSet("start", {"motor.gain": 3.0}, {}, "test")
     ),
     "diagnose.package": lambda f: edit(f / "package" / "Effect.mo", "block", "model"),
     "diagnose.catalogue": lambda f: edit(f / "own" / "drag.py", "None", "1"),
@@ -153,8 +152,6 @@ def test_an_edited_file_is_another_study(folder: Path, key: str) -> None:
 
 def test_another_fmu_is_another_study(folder: Path) -> None:
     before = study_identity(load(folder, valid()))
-    import zipfile
-
     with zipfile.ZipFile(folder / "Small.fmu", "a") as archive:
         archive.writestr("resources/table.txt", "1 2 3")
     assert changed(before, study_identity(load(folder, valid()))) == ["fmu"]
@@ -187,48 +184,3 @@ def test_stages_count_with_all_that_they_ask(folder: Path) -> None:
     stages.write_text(toml({"kind": "identify", "stages": [{"scenario": "one.toml", "give": ["J"]}]}))
     again = stages_identity(load_study(stages))  # type: ignore[arg-type]
     assert changed(after, again) == ["stages[one].give"]
-
-
-# -- the folder ---------------------------------------------------------------------------------------
-ASKED = {"kind": "identify", "cost.error": "squared", "fmu": "a" * 64, "seed": 1}
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "words"),
-    [
-        ("seed", 2, "with seed = 1; now it is = 2"),
-        ("cost.error", "huber", 'with cost.error = "squared"; now it is = "huber"'),
-        ("cost.error", None, 'with cost.error = "squared"; now it is not given'),
-        ("fmu", "b" * 64, "with fmu sha256 aaaaaaaaaaaa; now it is sha256 bbbbbbbbbbbb"),
-        ("kind", "tune", 'with kind = "identify"; now it is = "tune"'),
-        ("force.band", 20.0, "with force.band not given; now it is = 20.0"),
-    ],
-)
-def test_one_sentence_names_the_key_and_both_values(tmp_path: Path, key: str, value: Any, words: str) -> None:
-    assert open_study(tmp_path / "study", ASKED) is False
-    assert open_study(tmp_path / "study", ASKED) is True
-    with pytest.raises(InputError) as caught:
-        open_study(tmp_path / "study", {**ASKED, key: value})
-    assert words in str(caught.value)
-    assert str(caught.value).endswith(": choose another folder with -o, or change it back.")
-    assert open_study(tmp_path / "study", ASKED) is True
-
-
-def test_several_changes_name_what_was_asked_before_what_follows_from_it(tmp_path: Path) -> None:
-    open_study(tmp_path / "study", {**ASKED, "start values.a": 1.0, "parameters (order)": ["a", "b"]})
-    with pytest.raises(InputError, match=r"with seed = 1; now it is = 2 \(and 2 more\)"):
-        open_study(tmp_path / "study", {**ASKED, "seed": 2})
-
-
-def test_the_title_is_shown_as_it_now_is(tmp_path: Path) -> None:
-    open_study(tmp_path / "study", ASKED, {"title": "old", "command": "a"})
-    open_study(tmp_path / "study", ASKED, {"title": "new"})
-    about = json.loads((tmp_path / "study" / MARKER).read_text())["about"]
-    assert (about["title"], about["command"]) == ("new", "a")
-    assert "started" in about
-
-
-def test_a_folder_of_an_older_version_is_refused(tmp_path: Path) -> None:
-    (tmp_path / MARKER).write_text('{"kind": "identify", "scenario": "0", "about": {}}')
-    with pytest.raises(InputError, match="of an older version"):
-        open_study(tmp_path, ASKED)

@@ -91,7 +91,8 @@ def _same(folder: Path, marker: Path, asked: Mapping[str, Any]) -> dict[str, Any
         key = keys[0]
         more = "" if len(keys) == 1 else f" (and {len(keys) - 1} more)"
         raise InputError(
-            f"{folder} holds a study with {key} {_shown(before.get(key))}; now it is {_shown(asked.get(key))}{more}:"
+            f"{folder} holds a study with {key} {_shown(before.get(key))};"
+            f" this one has {key} {_shown(asked.get(key))}{more}:"
             " choose another folder with -o, or change it back."
         )
     return found

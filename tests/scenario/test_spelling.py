@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from small_scenario import toml, valid, write_folder
 
-from thsa_cosim.diagnosis.catalogue import catalogue, choose
+from thsa_cosim.diagnosis.catalogue.known import choose, known_effects
 from thsa_cosim.errors import InputError
 from thsa_cosim.export.flatten import locate
 from thsa_cosim.scenario import load_study, load_tune
@@ -165,7 +165,7 @@ def load(path: Path, kind: str) -> object:
     scenario = load_study(path)
     spec = getattr(scenario, "diagnose", None)
     if spec is not None:  # what the diagnosis itself looks up, before it runs anything
-        choose(catalogue(spec.catalogue), spec.effects, "diagnose.effects")
+        choose(known_effects(spec.catalogue), spec.effects, "diagnose.effects")
         if spec.model is not None:
             locate(spec.model, spec.package)
     return scenario

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thsa_cosim.diagnosis import catalogue, superset
-from thsa_cosim.diagnosis.superset import build_superset
+from thsa_cosim.diagnosis.catalogue import superset
+from thsa_cosim.diagnosis.catalogue.known import known_effects
+from thsa_cosim.diagnosis.catalogue.superset import build_superset
 from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import Signals
 
 pytest.importorskip("rumoca")
-PACKAGE = Path(__file__).parents[2] / "modelica" / "THSA"
+PACKAGE = Path(__file__).parents[3] / "modelica" / "THSA"
 WINDAGE = "Effects/Windage.mo"
 
 
@@ -53,7 +54,7 @@ def test_the_superset_is_exported_anew_for_what_it_is_made_from(
         return output
 
     monkeypatch.setattr(superset, "export_fmu", fake)
-    effects = [catalogue()["windage"]]
+    effects = [known_effects()["windage"]]
     times, touch = CHANGES[change]
     fmu, *_ = build_superset("Actuator", package, effects, tmp_path / "kept")
     touch(package, fmu)
@@ -63,7 +64,7 @@ def test_the_superset_is_exported_anew_for_what_it_is_made_from(
 
 @pytest.mark.slow
 def test_an_edited_effect_acts_as_it_now_says(package: Path, tmp_path: Path) -> None:
-    effects = [catalogue()["windage"]]
+    effects = [known_effects()["windage"]]
 
     def speed() -> np.ndarray:
         fmu, slots, chosen = build_superset("Actuator", package, effects, tmp_path / "kept")

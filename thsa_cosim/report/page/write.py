@@ -1,6 +1,7 @@
 """A study folder → one HTML file that needs nothing else: style, script, plotly and data are inside."""
 
 import base64
+import contextlib
 import hashlib
 import os
 from collections.abc import Callable, Sequence
@@ -10,10 +11,9 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from thsa_cosim import __version__
-from thsa_cosim.errors import InputError
+from thsa_cosim.errors import InputError, MissingExtraError
 from thsa_cosim.report.page.comparison import comparison
 from thsa_cosim.report.page.content import Block, Figure, Fold, Section
 from thsa_cosim.report.page.convergence import convergence
@@ -109,7 +109,7 @@ def render(study: Study, shown: list[Section]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    scripts = [get_plotlyjs(), _template("page.js")]
+    scripts = [_plotly(), _template("page.js")]
     return environment.get_template("page.html").render(
         study=study,
         sections=shown,
@@ -136,6 +136,18 @@ def _figures(blocks: Sequence[Block]) -> list[Figure]:
         elif isinstance(block, Fold):
             found += _figures(block.blocks)
     return found
+
+
+def _plotly() -> str:
+    """Plotly's script: a wheel carries it; a checkout takes it from plotly itself."""
+    with contextlib.suppress(FileNotFoundError):
+        return _template("plotly.min.js")
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError as error:
+        raise MissingExtraError("A page of an editable installation", "test") from error
+    script: str = get_plotlyjs()
+    return script
 
 
 def _template(name: str) -> str:

@@ -202,7 +202,7 @@ def test_a_full_or_noexec_temporary_folder(tmp_path: Path, how: str, options: st
 
 def test_signals_of_the_fmus_own_are_no_outside_kill() -> None:
     batch = Batch([Job("lag")], None)
-    for time in (1.0, 2.0):
-        died = Attempt(Outcome(Status.CRASH, f"{time}"), None, signal.SIGSEGV.name, True, (4.0, time, 0.0))
+    for at in (1.0, 2.0):
+        died = Attempt(Outcome(Status.CRASH, f"{at}"), None, signal.SIGSEGV.name, True, (4.0, at, 0.0))
         batch.ended(0, died)
     assert [o.reason for o in batch.result()] == ["2.0"]

@@ -152,17 +152,17 @@ def simulate(
 
     Parameters that the scenario would identify keep their start values.
     """
-    from thsa_cosim.identify import open_study as claim_folder
-    from thsa_cosim.identify import study_identity
     from thsa_cosim.report.simulate.files import write_simulate
     from thsa_cosim.scenario import load_scenario
     from thsa_cosim.simulate import simulate as run
+    from thsa_cosim.study import open_study as claim_folder
+    from thsa_cosim.study import study_identity
 
     path = Path(scenario)
     loaded = load_scenario(path, fit=fit, validate=validate, fmu=fmu)
     suffix = "" if loaded.kind == "simulate" else "-simulate"
     place = Path(folder) if folder is not None else default_folder(path, suffix)
-    claim_folder(place, {**study_identity(loaded), "kind": "simulate"})
+    claim_folder(place, study_identity(loaded, "simulate"))
     write_simulate(run(loaded, folder=place, workers=workers or cores(), cluster=cluster), place)
     return _opened(place, SimulateStudy)
 

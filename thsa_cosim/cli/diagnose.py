@@ -52,8 +52,8 @@ def _with_package(scenario: "Scenario", package: Path | None) -> "Scenario":
 
 def _is_complete(scenario: "Scenario", folder: Path) -> bool:
     """Whether the folder holds this very study with its result; InputError if it holds another one."""
-    from thsa_cosim.identify import open_study, study_identity
     from thsa_cosim.report.files import RESULT
+    from thsa_cosim.study import open_study, study_identity
 
     if not (folder / RESULT).is_file():
         return False

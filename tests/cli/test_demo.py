@@ -7,7 +7,7 @@ import pytest
 
 from thsa_cosim import cli
 from thsa_cosim.cli import demo as demo_module
-from thsa_cosim.report.index_page import Entry, write_index
+from thsa_cosim.report.page.index import Entry, write_index
 
 ROOT = Path(__file__).parents[2]
 

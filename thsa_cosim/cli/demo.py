@@ -52,7 +52,7 @@ def demo(output: Path, quick: bool) -> None:
     """
     from rich.text import Text
 
-    from thsa_cosim.report.index_page import Entry, write_index
+    from thsa_cosim.report.page.index import Entry, write_index
 
     root = _data(output)
     can_export = all(importlib.util.find_spec(name) for name in _EXPORTER)

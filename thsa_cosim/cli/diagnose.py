@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 def diagnose(options: StudyOptions, package: Path | None) -> None:
     """Find what the model of SCENARIO lacks: trace the residual to an effect, add it, report held-out errors."""
     from thsa_cosim.diagnosis import diagnose as run
-    from thsa_cosim.report.diagnosis_json import write_diagnosis
-    from thsa_cosim.report.diagnosis_tables import print_diagnosis
+    from thsa_cosim.report.diagnose.result import write_diagnosis
+    from thsa_cosim.report.diagnose.tables import print_diagnosis
+    from thsa_cosim.report.files import RESULT
     from thsa_cosim.report.progress import StepDisplay
-    from thsa_cosim.report.study import RESULT
     from thsa_cosim.scenario import load_scenario
 
     loaded = load_scenario(options.scenario, **options.overrides)
@@ -52,7 +52,7 @@ def _with_package(scenario: "Scenario", package: Path | None) -> "Scenario":
 
 def _is_complete(scenario: "Scenario", folder: Path) -> bool:
     """Whether the folder holds this very study with its result; InputError if it holds another one."""
-    from thsa_cosim.report.study import RESULT
+    from thsa_cosim.report.files import RESULT
     from thsa_cosim.study import open_study, study_identity
 
     if not (folder / RESULT).is_file():

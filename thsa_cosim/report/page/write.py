@@ -14,23 +14,23 @@ from markupsafe import Markup
 
 from thsa_cosim import __version__
 from thsa_cosim.errors import InputError, MissingExtraError
-from thsa_cosim.report.page.comparison import comparison
-from thsa_cosim.report.page.content import Block, Figure, Fold, Section
-from thsa_cosim.report.page.convergence import convergence
-from thsa_cosim.report.page.correlation import correlation
-from thsa_cosim.report.page.diagnosis import before_after, candidates, recordings
-from thsa_cosim.report.page.failures import failures
-from thsa_cosim.report.page.folder import Part, Study, read_study
-from thsa_cosim.report.page.friction import friction
-from thsa_cosim.report.page.gains import gains
-from thsa_cosim.report.page.parameters import parameters
-from thsa_cosim.report.page.pareto import pareto
-from thsa_cosim.report.page.plane import plane
-from thsa_cosim.report.page.provenance import provenance
-from thsa_cosim.report.page.responses import responses
-from thsa_cosim.report.page.schedule import schedule
-from thsa_cosim.report.page.structure import attribution, structure
+from thsa_cosim.report.diagnose.structure import attribution, structure
+from thsa_cosim.report.diagnose.verdict import before_after, candidates, recordings
+from thsa_cosim.report.folder import Part, Study, read_study
+from thsa_cosim.report.identify.correlation import correlation
+from thsa_cosim.report.identify.friction import friction
+from thsa_cosim.report.identify.parameters import parameters
 from thsa_cosim.report.page.summary import summary
+from thsa_cosim.report.parts.comparison import comparison
+from thsa_cosim.report.parts.content import Block, Figure, Fold, Section
+from thsa_cosim.report.parts.convergence import convergence
+from thsa_cosim.report.parts.failures import failures
+from thsa_cosim.report.parts.provenance import provenance
+from thsa_cosim.report.tune.gains import gains
+from thsa_cosim.report.tune.pareto import pareto
+from thsa_cosim.report.tune.plane import plane
+from thsa_cosim.report.tune.responses import responses
+from thsa_cosim.report.tune.schedule import schedule
 
 PAGE = "report.html"
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from thsa_cosim.report.page import chart
-from thsa_cosim.report.page.chart import Chart
-from thsa_cosim.report.page.content import Block, Column, Figure, Section, Table
-from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.gains import limits_of, term_label, term_rows
-from thsa_cosim.report.page.responses import set_colours
-from thsa_cosim.report.page.text import count, number_cell, text_cell
+from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.parts import chart
+from thsa_cosim.report.parts.chart import Chart
+from thsa_cosim.report.parts.content import Block, Column, Figure, Section, Table
+from thsa_cosim.report.parts.text import count, number_cell, text_cell
+from thsa_cosim.report.tune.gains import limits_of, term_label, term_rows
+from thsa_cosim.report.tune.responses import set_colours
 from thsa_cosim.signals import FloatArray
 
 CHECK = "schedule_check.csv"

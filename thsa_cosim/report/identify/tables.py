@@ -6,13 +6,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from thsa_cosim.identify.results import ChannelError, ForceBalance, IdentifyResult
-from thsa_cosim.simulate import ChannelFit, SimulateResult
-
-
-def number(value: float | None, digits: int = 4) -> str:
-    """A number for a table; a dash where there is none."""
-    return "–" if value is None or value != value else f"{value:.{digits}g}"
+from thsa_cosim.identify.results import ForceBalance, IdentifyResult
+from thsa_cosim.report.parts.text import number, percent
+from thsa_cosim.report.simulate.tables import error_cells
 
 
 def print_identify(console: Console, result: IdentifyResult) -> None:
@@ -43,8 +39,8 @@ def laws_table(result: IdentifyResult) -> Table:
             law.law.form + (" (chosen)" if law.selected else ""),
             ", ".join(number(c, 3) for c in law.law.coefficients),
             "–" if published is None else ", ".join(number(c, 3) for c in published.coefficients),
-            _percent(law.deviation) if law.determined else "not determined",
-            _percent(law.law_deviation) if law.determined else "–",
+            percent(law.deviation) if law.determined else "not determined",
+            percent(law.law_deviation) if law.determined else "–",
         )
     return table
 
@@ -93,7 +89,7 @@ def errors_table(result: IdentifyResult) -> Table:
         table.add_column(heading, justify="right")
     for role, channels in result.errors.items():
         for name, error in channels.items():
-            table.add_row(role, Text(name), *_error_cells(error))
+            table.add_row(role, Text(name), *error_cells(error))
     return table
 
 
@@ -106,36 +102,3 @@ def force_sentence(force: ForceBalance) -> str:
         else f"; laps differ by {number(force.repeatability, 2)} {force.unit}"
     )
     return f"Force residual below {force.band:g} Hz: {by_role}{laps}."
-
-
-def print_simulate(console: Console, result: SimulateResult) -> None:
-    """Print how well each recording is met, and why any of them could not be simulated."""
-    table = Table(title="Simulated against measured", title_justify="left")
-    for heading in ("recording", "signal"):
-        table.add_column(heading)
-    for heading in ("rmse", "noise", "rmse / noise", "rmse / range"):
-        table.add_column(heading, justify="right")
-    for recording in result.recordings:
-        for name, error in recording.errors.items():
-            table.add_row(Text(recording.name), Text(name), *_error_cells(error))
-    console.print(table)
-    for recording in result.recordings:
-        if recording.simulated is None:
-            console.print(Text(f"{recording.name} failed: {recording.reason}"), highlight=False)
-    for note in result.notes:
-        console.print(Text(f"note: {note}"), highlight=False)
-
-
-def _error_cells(error: ChannelError | ChannelFit) -> tuple[str, str, str, str]:
-    unit = f" {error.unit}"
-    ratio = error.rmse / error.noise if error.noise > 0.0 else None
-    return (
-        number(error.rmse, 3) + unit,
-        number(error.noise, 3) + unit,
-        number(ratio, 3),
-        _percent(error.nrmse),
-    )
-
-
-def _percent(value: float | None) -> str:
-    return "–" if value is None or value != value else f"{100.0 * value:.2g} %"

@@ -1,11 +1,11 @@
 """Two terms of a tuning that cannot both be least: what was tried, and what nothing beats."""
 
-from thsa_cosim.report.page import chart
-from thsa_cosim.report.page.chart import Chart
-from thsa_cosim.report.page.content import Block, Column, Fold, Section, Table
-from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.gains import term_label
-from thsa_cosim.report.page.text import number_cell
+from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.parts import chart
+from thsa_cosim.report.parts.chart import Chart
+from thsa_cosim.report.parts.content import Block, Column, Fold, Section, Table
+from thsa_cosim.report.parts.text import number_cell
+from thsa_cosim.report.tune.gains import term_label
 from thsa_cosim.tune.combine import INFEASIBLE
 from thsa_cosim.tune.problem import ALL
 

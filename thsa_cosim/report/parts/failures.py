@@ -3,9 +3,9 @@
 from collections import Counter
 
 from thsa_cosim.batch import Status
-from thsa_cosim.report.page.content import Block, Column, Section, Table, Text
-from thsa_cosim.report.page.folder import Part
-from thsa_cosim.report.page.text import count, number_cell, text_cell
+from thsa_cosim.report.folder import Part
+from thsa_cosim.report.parts.content import Block, Column, Section, Table, Text
+from thsa_cosim.report.parts.text import count, number_cell, text_cell
 
 
 def failures(parts: tuple[Part, ...]) -> Section:

@@ -4,17 +4,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from thsa_cosim.identify.results import IdentifyResult
-from thsa_cosim.report.parameter_files import write_parameter_set
-from thsa_cosim.report.result_json import (
+from thsa_cosim.report.files import RESULT, write_json
+from thsa_cosim.report.identify.result import (
     identify_to_dict,
-    write_json,
     write_laws_csv,
     write_parameters_csv,
 )
+from thsa_cosim.report.parameter_files import write_parameter_set
 from thsa_cosim.report.signal_files import file_name, write_signals
-from thsa_cosim.simulate import SimulateResult
-
-RESULT = "result.json"
 
 
 def write_identify(
@@ -22,8 +19,8 @@ def write_identify(
 ) -> list[Path]:
     """Write result.json, parameters.csv, laws.csv, the signals and the plots; return what was written, in order."""
     # matplotlib takes half a second to import: not before the study has run.
-    from thsa_cosim.report.friction import write_friction
-    from thsa_cosim.report.plots import plot_comparison, plot_convergence, plot_law, plot_laws
+    from thsa_cosim.report.identify.friction import write_friction
+    from thsa_cosim.report.identify.plots import plot_comparison, plot_convergence, plot_law, plot_laws
 
     written: list[Path] = []
 
@@ -64,15 +61,4 @@ def write_identify(
         note(path)
     plot_convergence(result, plots / "convergence.png")
     note(plots / "convergence.png")
-    return written
-
-
-def write_simulate(result: SimulateResult, folder: Path) -> list[Path]:
-    """Write the signals of a simulate study, whose result.json and CSV files are there; return all its files."""
-    written = list(result.files)
-    for recording in result.recordings:
-        if recording.simulated is not None:
-            simulated = recording.simulated.select(recording.measured.names)
-            both = {"measured": recording.measured, "simulated": simulated}
-            written.append(write_signals(folder, recording.role, recording.name, both))
     return written

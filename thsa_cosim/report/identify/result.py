@@ -1,9 +1,6 @@
 """``result.json`` of an identification, and its tables as CSV files."""
 
-import csv
-import json
 import math
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,11 +9,12 @@ import numpy as np
 
 from thsa_cosim.identify.results import ChannelError, IdentifyResult, LawResult, PointResult
 from thsa_cosim.laws import Law
+from thsa_cosim.report.files import plain, write_csv
 
 
 def identify_to_dict(result: IdentifyResult) -> dict[str, Any]:
     """Return the result as plain JSON types; numbers that are not finite become null."""
-    content: dict[str, Any] = _plain(
+    content: dict[str, Any] = plain(
         {
             "kind": "identify",
             "title": result.title,
@@ -51,13 +49,6 @@ def identify_to_dict(result: IdentifyResult) -> dict[str, Any]:
     return content
 
 
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write ``content`` whole or not at all: a reader never sees half a file."""
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    partial.replace(path)
-
-
 def write_parameters_csv(path: Path, result: IdentifyResult) -> None:
     """One row per point and parameter: value, standard error, whether the data determine it and why not."""
     header = ("temperature_degC", "parameter", "value", "stderr", "unit", "identifiable", "reason")
@@ -74,7 +65,7 @@ def write_parameters_csv(path: Path, result: IdentifyResult) -> None:
         for point in result.points
         for name, estimate in point.parameters.items()
     ]
-    _write_csv(path, header, rows)
+    write_csv(path, header, rows)
 
 
 def write_laws_csv(path: Path, result: IdentifyResult, step: float = 1.0) -> None:
@@ -89,14 +80,7 @@ def write_laws_csv(path: Path, result: IdentifyResult, step: float = 1.0) -> Non
             header += [f"{name} [{law.unit}]", f"{name} stderr [{law.unit}]"]
             columns += [law.law(grid).tolist(), law.law.stderr(grid).tolist()]
     rows = [["" if math.isnan(v) else repr(v) for v in row] for row in zip(*columns, strict=True)]
-    _write_csv(path, header, rows)
-
-
-def _write_csv(path: Path, header: Any, rows: Any) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(header)
-        writer.writerows(rows)
+    write_csv(path, header, rows)
 
 
 def _point(point: PointResult) -> dict[str, Any]:
@@ -183,15 +167,3 @@ def _error(error: ChannelError) -> dict[str, Any]:
         "unit": error.unit,
         "samples": error.samples,
     }
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

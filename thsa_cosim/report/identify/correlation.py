@@ -4,11 +4,11 @@ from itertools import combinations
 
 import numpy as np
 
-from thsa_cosim.report.page import chart
-from thsa_cosim.report.page.chart import Chart
-from thsa_cosim.report.page.content import Block, Cell, Column, Figure, Section, Table
-from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.text import degrees, number_cell, quantity, text_cell
+from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.parts import chart
+from thsa_cosim.report.parts.chart import Chart
+from thsa_cosim.report.parts.content import Block, Cell, Column, Figure, Section, Table
+from thsa_cosim.report.parts.text import degrees, number_cell, quantity, text_cell
 
 #: From here on two estimates move together so much that only their combination is known.
 STRONG = 0.95

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thsa_cosim.report.page.content import Figure
+from thsa_cosim.report.parts.content import Figure
 
 FloatArray = NDArray[np.float64]
 

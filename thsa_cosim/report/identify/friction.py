@@ -1,4 +1,4 @@
-"""Friction over speed and temperature: equation 5 of the article with the identified laws, as table and plot.
+"""Friction over speed and temperature: equation 5 of the article with the identified laws, as table, plot and section.
 
 On this rig F_f = F_C + b_v |v|; figures 7 and 8 of the article show such surfaces.
 """
@@ -10,11 +10,18 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Sheet
 from numpy.typing import NDArray
 
 from thsa_cosim.identify.results import LawResult
 from thsa_cosim.laws import Law
+from thsa_cosim.report.folder import Json
+from thsa_cosim.report.identify.parameters import read_law
+from thsa_cosim.report.parts.chart import Chart, packed, plain
+from thsa_cosim.report.parts.content import Figure, Section
+
+STEPS = 41
+"""Speeds and temperatures of a surface on the page."""
 
 FloatArray = NDArray[np.float64]
 
@@ -78,7 +85,7 @@ def _write_table(
 def _plot(
     path: Path, element: Element, unit: str, speed: FloatArray, temperature: FloatArray, friction: FloatArray
 ) -> None:
-    figure = Figure(figsize=(7.0, 4.8), layout="constrained")
+    figure = Sheet(figsize=(7.0, 4.8), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     filled = axes.contourf(speed, temperature, friction, levels=20, cmap="viridis")
@@ -90,3 +97,46 @@ def _plot(
     axes.set_title(f"Friction of the {element.title}: {element.coulomb} + {element.viscous} |v|", fontsize=11)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=130, format="png")
+
+
+def friction(result: Json, prefix: str = "") -> Section | None:
+    """The section; None unless some element's Coulomb and viscous laws are both known."""
+    laws: Json = result.get("laws", {})
+    temperatures = [
+        p["temperature_degC"] for p in result.get("points", []) if p["temperature_degC"] is not None
+    ]
+    known = [e for e in ELEMENTS if e.coulomb in laws and e.viscous in laws]
+    if not temperatures or not known:
+        return None
+    span = min(temperatures), max(temperatures)
+    figures = tuple(_figure(f"{prefix}friction-{e.title}", e, laws, span) for e in known)
+    return Section(f"{prefix}friction", "Friction over speed and temperature", figures)
+
+
+def _figure(name: str, element: Element, laws: Json, span: tuple[float, float]) -> Figure:
+    speed, temperature = np.linspace(0.0, element.fastest, STEPS), np.linspace(*span, STEPS)
+    values = surface(read_law(laws[element.coulomb]), read_law(laws[element.viscous]), speed, temperature)
+    title = {
+        "text": plain(f"friction [{laws[element.coulomb]['unit']}]"),
+        "side": "right",
+        "font": {"size": 13},
+    }
+    drawn = Chart(name, row_height=300)
+    drawn.add(
+        0,
+        0,
+        "",
+        type="contour",
+        x=packed(speed),
+        y=packed(temperature),
+        z=packed(values),
+        ncontours=20,
+        colorscale="Viridis",
+        contours={"showlabels": True, "labelfont": {"color": "white", "size": 11}, "labelformat": "~g"},
+        line={"width": 0.5, "color": "white"},
+        colorbar={"tickformat": "~g", "title": title},
+        hovertemplate="speed %{x:.3g}<br>temperature %{y:.3g} °C<br>friction %{z:.4g}<extra></extra>",
+    )
+    drawn.axes(x=f"speed [{element.unit}]", y="temperature [°C]")
+    drawn.title(f"Friction of the {element.title}: {element.coulomb} + {element.viscous} |v|")
+    return drawn.build(f"Friction of the {element.title} by the identified laws, at its own speed.")

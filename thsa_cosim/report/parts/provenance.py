@@ -3,8 +3,8 @@
 import datetime
 
 from thsa_cosim import __version__
-from thsa_cosim.report.page.content import Block, Facts, Section, Text
-from thsa_cosim.report.page.folder import Json, Part, Study
+from thsa_cosim.report.folder import Json, Part, Study
+from thsa_cosim.report.parts.content import Block, Facts, Section, Text
 
 
 def provenance(study: Study) -> Section:

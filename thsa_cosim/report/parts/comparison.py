@@ -4,13 +4,21 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from thsa_cosim.report.page import chart
-from thsa_cosim.report.page.chart import Chart
-from thsa_cosim.report.page.content import Block, Cell, Column, Figure, Fold, Section, Table, Text
-from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.text import DASH, count, degrees, percent, quantity, significant_cell, text_cell
+from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.parts import chart
+from thsa_cosim.report.parts.chart import Chart
+from thsa_cosim.report.parts.content import Block, Cell, Column, Figure, Fold, Section, Table, Text
+from thsa_cosim.report.parts.text import (
+    DASH,
+    count,
+    degrees,
+    number,
+    percent,
+    quantity,
+    significant_cell,
+    text_cell,
+)
 from thsa_cosim.report.signal_files import SignalFile, read_signals, signal_paths
-from thsa_cosim.report.tables import number
 
 #: rmse over noise up to which a model counts as met, and from which it lacks something.
 MET, MISSED = 1.2, 2.0

@@ -2,16 +2,15 @@
 
 import numpy as np
 
-from thsa_cosim.report.page import chart
-from thsa_cosim.report.page.chart import Chart, packed, plain
-from thsa_cosim.report.page.content import Block, Section, Text
-from thsa_cosim.report.page.convergence import part_evolutions
-from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.gains import gain_sets
-from thsa_cosim.report.page.populations import Evolution
-from thsa_cosim.report.page.responses import set_colours
-from thsa_cosim.report.page.text import quantity
-from thsa_cosim.report.tables import number
+from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.parts import chart
+from thsa_cosim.report.parts.chart import Chart, packed, plain
+from thsa_cosim.report.parts.content import Block, Section, Text
+from thsa_cosim.report.parts.convergence import part_evolutions
+from thsa_cosim.report.parts.populations import Evolution
+from thsa_cosim.report.parts.text import number, quantity
+from thsa_cosim.report.tune.gains import gain_sets
+from thsa_cosim.report.tune.responses import set_colours
 
 #: Generations of which the population is drawn, as shares of the search.
 SHOWN = (0.0, 0.15, 0.4, 1.0)

@@ -10,9 +10,8 @@ import pandas as pd
 
 from thsa_cosim.diagnosis.results import ChannelError, DiagnosisResult, EmpiricalLaw, Errors, Value
 from thsa_cosim.identify import ForceBalance
-from thsa_cosim.report.result_json import write_json
+from thsa_cosim.report.files import RESULT, write_json
 from thsa_cosim.report.signal_files import write_signals
-from thsa_cosim.report.study import RESULT
 
 
 def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from thsa_cosim.report.page.chart import AFTER, BEFORE, RESIDUAL, Chart
-from thsa_cosim.report.page.content import Block, Cell, Column, Figure, Fold, Section, Table
-from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.text import count, number_cell, percent, plus_minus, text_cell
-from thsa_cosim.report.tables import number
+from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.parts.chart import AFTER, BEFORE, RESIDUAL, Chart
+from thsa_cosim.report.parts.content import Block, Cell, Column, Figure, Fold, Section, Table
+from thsa_cosim.report.parts.text import count, number, number_cell, percent, plus_minus, text_cell
 from thsa_cosim.signals import FloatArray
 
 STRUCTURE = "structure.csv"

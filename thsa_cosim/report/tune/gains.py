@@ -2,10 +2,9 @@
 
 from collections.abc import Mapping
 
-from thsa_cosim.report.page.content import Block, Cell, Column, Section, Table
-from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.text import DASH, number_cell, text_cell
-from thsa_cosim.report.tables import number
+from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.parts.content import Block, Cell, Column, Section, Table
+from thsa_cosim.report.parts.text import DASH, number, number_cell, text_cell
 
 
 def gains(part: Part) -> Section | None:

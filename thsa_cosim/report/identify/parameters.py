@@ -3,12 +3,11 @@
 import numpy as np
 
 from thsa_cosim.laws import Law
-from thsa_cosim.report.page import chart
-from thsa_cosim.report.page.chart import Chart
-from thsa_cosim.report.page.content import Block, Cell, Column, Figure, Section, Table
-from thsa_cosim.report.page.folder import Json
-from thsa_cosim.report.page.text import DASH, degrees, percent, plus_minus, text_cell
-from thsa_cosim.report.tables import number
+from thsa_cosim.report.folder import Json
+from thsa_cosim.report.parts import chart
+from thsa_cosim.report.parts.chart import Chart
+from thsa_cosim.report.parts.content import Block, Cell, Column, Figure, Section, Table
+from thsa_cosim.report.parts.text import DASH, degrees, number, percent, plus_minus, text_cell
 
 
 def parameters(result: Json, prefix: str = "") -> Section | None:

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable
 
-from thsa_cosim.report.page import chart
-from thsa_cosim.report.page.chart import Chart
-from thsa_cosim.report.page.content import Block, Figure, Fold, Section
-from thsa_cosim.report.page.folder import Part
+from thsa_cosim.report.folder import Part
+from thsa_cosim.report.parts import chart
+from thsa_cosim.report.parts.chart import Chart
+from thsa_cosim.report.parts.content import Block, Figure, Fold, Section
 from thsa_cosim.report.signal_files import SignalFile, read_signals, signal_paths
 
 COMMAND = "command"

@@ -39,7 +39,7 @@ def write_index(path: Path, title: str, entries: Sequence[Entry]) -> Path:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    style = (Path(__file__).parent / "page" / "templates" / "page.css").read_text(encoding="utf-8")
+    style = (Path(__file__).parent / "templates" / "page.css").read_text(encoding="utf-8")
     links = [
         quote(Path(os.path.relpath(entry.page, path.parent)).as_posix())
         if entry.page is not None and entry.page.exists()

@@ -9,7 +9,7 @@ from typing import Any
 
 from thsa_cosim.batch import JournalTable, read_journal
 from thsa_cosim.errors import InputError
-from thsa_cosim.report.study import RESULT
+from thsa_cosim.report.files import RESULT
 
 MARKER, JOURNAL = "study.json", "journal.csv"
 

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from thsa_cosim.report.tables import number
+from thsa_cosim.report.parts.text import number
 
 Content = Mapping[str, Any]
 

@@ -4,10 +4,14 @@ import math
 import re
 from collections.abc import Sequence
 
-from thsa_cosim.report.page.content import Cell
-from thsa_cosim.report.tables import number
+from thsa_cosim.report.parts.content import Cell
 
 DASH = "–"
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number for a table; a dash where there is none."""
+    return "–" if value is None or value != value else f"{value:.{digits}g}"
 
 
 def plus_minus(value: float | None, stderr: float | None) -> str:

@@ -1,13 +1,14 @@
 """A diagnosis: the verdict with the effects it names, and whether they help on recordings that no fit has seen."""
 
-from thsa_cosim.report.page.chart import AFTER, BEFORE, Chart
-from thsa_cosim.report.page.comparison import noise_ratio, ratio_mark, recording_folds, role_text
-from thsa_cosim.report.page.content import Block, Cell, Column, Facts, Figure, Fold, Section, Table, Text
-from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.text import (
+from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.parts.chart import AFTER, BEFORE, Chart
+from thsa_cosim.report.parts.comparison import noise_ratio, ratio_mark, recording_folds, role_text
+from thsa_cosim.report.parts.content import Block, Cell, Column, Facts, Figure, Fold, Section, Table, Text
+from thsa_cosim.report.parts.text import (
     DASH,
     count,
     listing,
+    number,
     number_cell,
     percent,
     plus_minus,
@@ -15,7 +16,6 @@ from thsa_cosim.report.page.text import (
     text_cell,
 )
 from thsa_cosim.report.signal_files import read_signals, signal_paths, signal_units
-from thsa_cosim.report.tables import number
 
 _VERDICTS = {
     "missing-effect": "The model lacks {effects}: added to it, the error on held-out recordings falls.",

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from thsa_cosim.report.page import chart
-from thsa_cosim.report.page.chart import Chart
-from thsa_cosim.report.page.content import Block, Column, Figure, Section, Table
-from thsa_cosim.report.page.folder import Json, Part
-from thsa_cosim.report.page.populations import Evolution, evolutions
-from thsa_cosim.report.page.text import number_cell, search_label, text_cell
+from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.parts import chart
+from thsa_cosim.report.parts.chart import Chart
+from thsa_cosim.report.parts.content import Block, Column, Figure, Section, Table
+from thsa_cosim.report.parts.populations import Evolution, evolutions
+from thsa_cosim.report.parts.text import number_cell, search_label, text_cell
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.tune.combine import INFEASIBLE
 

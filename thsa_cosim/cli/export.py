@@ -1,20 +1,31 @@
 """The command ``export``: a Modelica class as an FMU."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
 
 from thsa_cosim.cli.options import PATH
+from thsa_cosim.shipped import modelica_package
 
 
 @click.command()
-@click.argument("model")
+@click.argument("model", required=False)
 @click.option(
     "--package",
     type=PATH,
     default=None,
     help="Folder of its package; default: modelica/THSA, or the shipped one.",
 )
+@click.option(
+    "--library",
+    "libraries",
+    type=PATH,
+    multiple=True,
+    help="A Modelica library: a package's folder, a folder of packages or a .mo file; may be repeated. Those of the "
+    "environment variable MODELICAPATH follow.",
+)
+@click.option("--list", "listing", is_flag=True, help="List the models of the libraries (or of the package) instead.")
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", show_default=True, help="FMI version.")
 @click.option("-o", "--output", type=PATH, default=None, help="The FMU to write; default MODEL.fmu.")
 @click.option(
@@ -26,13 +37,37 @@ from thsa_cosim.cli.options import PATH
 )
 @click.option("--platforms", default=None, help="Comma-separated FMI platforms, for example win64,linux64.")
 def export(
-    model: str, package: Path | None, fmi: str, output: Path | None, compiler: str, platforms: str | None
+    model: str | None,
+    package: Path | None,
+    libraries: tuple[Path, ...],
+    listing: bool,
+    fmi: str,
+    output: Path | None,
+    compiler: str,
+    platforms: str | None,
 ) -> None:
     """Export the Modelica class MODEL (or a .mo file's class) as an FMU."""
-    from thsa_cosim.export import export_fmu
+    from thsa_cosim.export import export_fmu, list_models
 
+    if listing:
+        _list(list_models(library) for library in libraries or (package or modelica_package(),))
+        return
+    if model is None:
+        raise click.UsageError("MODEL is missing: a class name, or a .mo file; --list lists the models of a library.")
     chosen = None if platforms is None else [part.strip() for part in platforms.split(",") if part.strip()]
     path = export_fmu(
-        model, package=package, fmi=int(fmi), output=output, compiler=compiler, platforms=chosen
+        model,
+        package=package,
+        fmi=int(fmi),
+        output=output,
+        compiler=compiler,
+        platforms=chosen,
+        libraries=libraries,
     )
     click.echo(str(path))
+
+
+def _list(found: Iterable[list[str]]) -> None:
+    for names in found:
+        for name in names:
+            click.echo(name)

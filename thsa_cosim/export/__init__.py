@@ -1,7 +1,7 @@
 """Modelica class → FMU: flatten, order the equations, generate C, compile, pack.
 
-``flatten`` → ``causal`` (with ``expression``, ``structure``, ``solve``) → ``codegen`` and ``description`` →
-``compile`` → ``archive``; the C that is the same for every model is in ``runtime/``.
+``flatten`` (by ``thsa_cosim.modelica``) → ``causal`` (with ``discrete``, ``expression``, ``structure``, ``solve``) →
+``codegen`` (with ``implicit``) and ``description`` → ``compile`` → ``archive``; the C that is the same for every model is in ``runtime/``.
 """
 
 import dataclasses
@@ -11,9 +11,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from thsa_cosim.errors import MissingExtraError, ModelicaError, ParameterError, did_you_mean
+from thsa_cosim.export.flatten import list_models
 from thsa_cosim.shipped import modelica_package
 
-__all__ = ["export_fmu"]
+__all__ = ["export_fmu", "list_models"]
 
 
 def export_fmu(
@@ -25,6 +26,7 @@ def export_fmu(
     compiler: str = "native",
     start_values: Mapping[str, float] | None = None,
     platforms: Sequence[str] | None = None,
+    libraries: Sequence[Path] = (),
 ) -> Path:
     """Export a Modelica class as an FMU with Co-Simulation and Model Exchange; returns the archive's path.
 
@@ -44,6 +46,9 @@ def export_fmu(
         Start values of parameters that replace those of the model, in the model's units.
     platforms:
         What to compile for, by the names of FMI 2.0 or 3.0 (``win64``, ``x86_64-linux``, …); default all.
+    libraries:
+        Further Modelica libraries: packages' folders, folders of packages (such as a Modelica tool's library folder) or
+        ``.mo`` files; those of the environment variable MODELICAPATH follow. Only what the class uses is read.
 
     Raises
     ------
@@ -52,7 +57,7 @@ def export_fmu(
     ParameterError
         A start value names no parameter of the model, or a platform is unknown.
     MissingExtraError
-        rumoca, CasADi or ziglang is not installed.
+        CasADi or ziglang is not installed.
     """
     if fmi not in (2, 3):
         raise ModelicaError(f"FMI version {fmi} is not supported; choose 2 or 3.")
@@ -60,7 +65,7 @@ def export_fmu(
     if compiler == "omc":
         from thsa_cosim.export.openmodelica import export_with_openmodelica
 
-        return export_with_openmodelica(model, package, fmi, output)
+        return export_with_openmodelica(model, package, fmi, output, libraries)
     try:
         import casadi  # noqa: F401
     except ImportError as error:
@@ -70,7 +75,7 @@ def export_fmu(
     from thsa_cosim.export.compile import PLATFORMS
     from thsa_cosim.export.flatten import flatten
 
-    causal = make_causal(flatten(model, package))
+    causal = make_causal(flatten(model, package, libraries))
     if start_values:
         settable = {v.name for v in causal.variables if v.start is not None}
         for name in start_values:

@@ -1,14 +1,16 @@
 """Flat model → explicit ordinary differential equation with outputs, events and initial values (CasADi SX)."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 
 from thsa_cosim.errors import ModelicaError
-from thsa_cosim.export.expression import Translator, equation_text
-from thsa_cosim.export.flatten import Expression, FlatModel, FlatVariable
-from thsa_cosim.export.solve import EquationSystem
+from thsa_cosim.export.discrete import referenced, split_discrete
+from thsa_cosim.export.expression import Translator
+from thsa_cosim.export.solve import Block, EquationSystem
+from thsa_cosim.modelica.flat import Assertion, FlatEquation, FlatModel, FlatVariable
+from thsa_cosim.modelica.terms import Scalar, Term, plain, substitute, text
 
 
 @dataclass(frozen=True)
@@ -16,7 +18,8 @@ class ModelVariable:
     """One variable of the exported model.
 
     ``kind`` is "state", "derivative", "input", "parameter", "dependent" or "algebraic"; ``index`` counts within the
-    kind. Aliases share kind and index. ``start`` is given where it may be set before initialization.
+    kind. Aliases share kind and index. ``start`` is given where it may be set before initialization. ``discrete`` says
+    that the value changes at events only.
     """
 
     name: str
@@ -29,14 +32,35 @@ class ModelVariable:
     minimum: float | None
     maximum: float | None
     nominal: float | None
+    discrete: bool = False
+
+
+@dataclass(frozen=True)
+class Events:
+    """What happens at events, over the symbols of the model.
+
+    ``z`` are the discrete variables, the first ``left`` of them left limits of continuous ones; ``update`` are their
+    new values, ``z_start`` those before the first event; ``reinit`` are the new values of the states. ``samples`` has
+    the columns start and interval. In the model's m follow on the modes: z, pre(z), one tick a sample, and a 1 that
+    holds while the initial values are found.
+    """
+
+    z: tuple[str, ...] = ()
+    left: int = 0
+    update: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    z_start: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    reinit: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    samples: ca.SX = field(default_factory=lambda: ca.SX(0, 2))
+    used: bool = False
 
 
 @dataclass(frozen=True)
 class CausalModel:
-    """dx/dt = f(t, x, u, p, d, m), w = h(...), g = event indicators, x(0) = initial(...).
+    """dx/dt = f(t, x, u, p, d, m, y), w = h(...), g = event indicators, x(0) = initial(...).
 
     p are the parameters that can be set, d = dependent(p) the calculated ones, m the modes (relation k holds when
-    g[k] > 0). All expressions are CasADi SX columns over the symbols of this object.
+    g[k] > 0) and what else is constant between events. y are the unknowns of the implicit ``blocks``, whose residuals
+    are zero. All expressions are CasADi SX columns over the symbols of this object.
     """
 
     flat: FlatModel
@@ -55,13 +79,23 @@ class CausalModel:
     g: ca.SX
     dependent: ca.SX
     initial: ca.SX
+    events: Events = field(default_factory=Events)
+    blocks: tuple[Block, ...] = ()
+    initial_blocks: tuple[Block, ...] = ()
+    y_start: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    assertions: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+
+    @property
+    def y(self) -> ca.SX:
+        """Unknowns of all implicit blocks."""
+        return column(b.unknown.nz[i] for b in self.blocks for i in range(b.unknown.numel()))
 
 
 def make_causal(flat: FlatModel) -> CausalModel:
     """Order and solve the equations of a flat model.
 
-    Raises ModelicaError, naming the equation and the variable, for a singular system, an algebraic loop that is not
-    linear, a constraint that needs the derivative of an input, and an over-determined initialization.
+    Raises ModelicaError, naming the equation and the variable, for a singular system, a constraint that needs the
+    derivative of an input, and an over-determined initialization.
     """
     return _Builder(flat).build()
 
@@ -77,115 +111,147 @@ class _Builder:
         self.dependents: list[FlatVariable] = []
         self.inputs: list[FlatVariable] = []
         self.unknowns: list[FlatVariable] = []
-        self.booleans: dict[str, Expression] = {}
-        symbols: dict[str, ca.SX] = {"time": self.time}
+        self.free: list[FlatVariable] = []  # parameters that the initial equations determine
+        self.discretes: list[FlatVariable] = []
+        self.split = split_discrete(flat)
+        self.symbols: dict[str, ca.SX] = {"time": self.time}
+        self.translator = Translator(self.symbols, self._derivative, frozenset(), dict())
+        self.memory = self.translator.memory
+        self._determined: dict[str, bool] = {}
         for variable in flat.variables.values():
-            self._sort(variable, symbols)
-        self.symbols = symbols
-        discrete = frozenset(v.name for v in (*self.parameters, *self.dependents))
-        self.translator = Translator(symbols, self._derivative, discrete, self.booleans)
+            self._sort(variable)
+        self.translator.discrete = frozenset(v.name for v in (*self.parameters, *self.dependents))
         self.system = EquationSystem(self.time, frozenset(v.name for v in self.inputs))
 
-    def _sort(self, variable: FlatVariable, symbols: dict[str, ca.SX]) -> None:
-        name = variable.name
-        if variable.variability == "constant" or (
-            variable.variability == "parameter" and variable.type != "Real"
-        ):
+    def _sort(self, variable: FlatVariable) -> None:
+        name, symbols = variable.name, self.symbols
+        if variable.variability == "constant" or (variable.structural and variable.variability == "parameter"):
             symbols[name] = ca.SX(self._value(name))
+        elif variable.variability == "parameter" and variable.type != "Real":
+            if isinstance(variable.binding, Term) and self._depends(variable.binding):
+                self.translator.inline[name] = variable.binding
+            else:
+                symbols[name] = ca.SX(self._value(name))
         elif variable.variability == "parameter":
-            symbols[name] = ca.SX.sym(name)
-            (
-                self.dependents if variable.final or self._depends(variable.binding) else self.parameters
-            ).append(variable)
-        elif variable.type == "Boolean":
-            if variable.causality != "local":
-                raise ModelicaError(
-                    f"{self.flat.name}: {name} is a Boolean {variable.causality}; the exporter supports Real ones."
-                )
-            if variable.binding is not None:
-                self.booleans[name] = variable.binding
-        elif variable.type != "Real":
-            raise ModelicaError(
-                f"{self.flat.name}: {name} is an Integer that varies in time, which the exporter does not support."
-            )
+            self._sort_parameter(variable)
         elif variable.causality == "input":
+            if variable.type != "Real":
+                raise ModelicaError(
+                    f"{variable.place}: {name} is a {variable.type} input; the exporter supports Real ones."
+                )
             symbols[name] = ca.SX.sym(name)
             self.inputs.append(variable)
+        elif variable.variability == "discrete":
+            self.discretes.append(variable)
+            if name in self.split.inline:
+                self.translator.inline[name] = self.split.definitions[name]
+            else:
+                symbols[name] = self.memory.add(name)
         else:
             symbols[name] = ca.SX.sym(name)
             self.unknowns.append(variable)
 
-    def _depends(self, expression: Expression | None) -> bool:
-        """Whether a binding refers to a parameter that can be set."""
-        if expression is None:
-            return False
-        if "VarRef" in expression:
-            referred = self.flat.variables.get(str(expression["VarRef"]["name"]["name"]))
-            return referred is None or (referred.variability == "parameter" and referred.type == "Real")
-        return any(self._depends(part) for part in _children(expression))
+    def _sort_parameter(self, variable: FlatVariable) -> None:
+        name = variable.name
+        if variable.binding is None and variable.fixed is False:
+            self.symbols[name] = self.memory.add(name)
+            self.free.append(variable)
+        elif self._from_free(variable.binding):
+            self.symbols[name] = ca.SX.sym(name)
+            self.unknowns.append(variable)
+        else:
+            self.symbols[name] = ca.SX.sym(name)
+            calculated = variable.final or self._depends(variable.binding)
+            (self.dependents if calculated else self.parameters).append(variable)
+
+    def _from_free(self, binding: Scalar | None) -> bool:
+        """Whether a binding depends on a parameter that the initial equations determine."""
+        for name in referenced([binding]):
+            if name not in self._determined:
+                variable = self.flat.variables.get(name)
+                self._determined[name] = False
+                if variable is not None and variable.variability == "parameter":
+                    free = variable.binding is None and variable.fixed is False and not variable.structural
+                    self._determined[name] = free or self._from_free(variable.binding)
+            if self._determined[name]:
+                return True
+        return False
+
+    def _depends(self, value: Scalar | None) -> bool:
+        """Whether a value refers to a parameter that can be set."""
+        for name in referenced([value]):
+            variable = self.flat.variables.get(name)
+            if variable is None or (
+                variable.variability == "parameter"
+                and not variable.structural
+                and (variable.type == "Real" or self._depends(variable.binding))
+            ):
+                return True
+        return False
 
     def _value(self, name: str, pending: tuple[str, ...] = ()) -> float:
         """Default value of a parameter or constant."""
         if name not in self.values:
             variable = self.flat.variables.get(name)
-            if variable is None or variable.variability == "continuous" or name in pending:
+            if variable is None or variable.variability not in ("parameter", "constant") or name in pending:
                 raise ModelicaError(
                     f"{self.flat.name}: the value of {(*pending, name)[0]} depends on {name}, which has no fixed value."
                 )
-            self.values[name] = self._evaluate(variable.binding or variable.start, (*pending, name)) or 0.0
+            given = variable.start if variable.binding is None else variable.binding
+            self.values[name] = self._evaluate(given, (*pending, name)) or 0.0
         return self.values[name]
 
-    def _evaluate(self, expression: Expression | None, pending: tuple[str, ...] = ()) -> float | None:
+    def _evaluate(self, value: Scalar | None, pending: tuple[str, ...] = ()) -> float | None:
         """Numeric value of an attribute at the default parameters, None when there is none."""
-        if expression is None:
+        if value is None:
             return None
 
-        class Defaults(dict[str, ca.SX]):
-            def __missing__(_, key: str) -> ca.SX:
-                return ca.SX(self._value(key, pending))
+        def known(term: Term) -> Scalar | None:
+            if term.op == "ref":
+                return self._value(term.args[0], pending)
+            return term.args[0] if term.op == "noEvent" and not isinstance(term.args[0], Term) else None
 
-            def __contains__(_, key: object) -> bool:
-                return True
-
-        translator = Translator(Defaults(), self._derivative, frozenset(), {})
-        literal = expression.get("Literal", {}).get("value", {})
-        if "Boolean" in literal:
-            return float(literal["Boolean"])
-        try:
-            return float(translator.real(expression))
-        except ModelicaError:
-            return float(translator.condition(expression))
+        result = plain(substitute(value, known, {}))
+        if isinstance(result, Term):
+            return float(Translator({}, self._derivative, frozenset()).real(result, events=False))
+        return float(result)
 
     def _derivative(self, name: str) -> ca.SX:
         return self.system.derivative(name)
+
+    # -- the steps
 
     def build(self) -> CausalModel:
         system, translate = self.system, self.translator
         for variable in self.unknowns:
             system.add_variable(variable.name, self.symbols[variable.name], self._preference(variable))
-        remaining = [e for e in self.flat.equations if not self._defines_boolean(e.residual)]
-        for equation in remaining:
-            system.add_equation(self._translated(equation.residual), equation_text(equation.residual))
+        for equation in self.split.equations:
+            system.add_equation(self._translated(equation), str(equation), equation.place)
         for variable in self.unknowns:
             if variable.binding is not None:
-                bound = self.symbols[variable.name] - translate.real(variable.binding)
-                system.add_equation(bound, f"{variable.name} = (its declaration)")
+                bound = self._at(variable.place, Term("-", (Term("ref", (variable.name,)), variable.binding)))
+                system.add_equation(bound, f"{variable.name} = {text(variable.binding)}", variable.place)
         dependent = self._dependent_values()
-        initial_equations = [
-            (self._translated(e.residual), equation_text(e.residual)) for e in self.flat.initial_equations
-        ]
+        initial_equations = [(self._translated(e), str(e)) for e in self.split.initial_equations]
+        self._updates()
+        reinits = [(r, self._at(r.place, r.condition), self._at(r.place, r.value)) for r in self.flat.reinits]
+        asserted = [self._assertion(a) for a in self.flat.assertions]
+        shown = {v.name: self._at(v.place, Term("ref", (v.name,))) for v in self.discretes}
+        self._finish_updates()
+        self._give_a_state()
         states = system.prepare(self.flat.name)
-        solution = system.solve(states, self.flat.name)
+        solution = system.solve(self.flat.name)
+        initial = self._initial(states, initial_equations)
+        unknown = [system.symbols[n] for n in solution]
+        solved = list(solution.values())
+
+        def final(expression: ca.SX) -> ca.SX:
+            return ca.substitute([expression], unknown, solved)[0]
+
         x = column([system.symbols[s] for s in states])
-        rhs = column([solution[system.derivative_name(s)] for s in states])
-        x_start, initial, settable = self._initial(states, initial_equations)
-        variables, algebraic, outputs = self._variables(states, solution, settable)
-        replace = list(solution)
-        indicators = ca.substitute(
-            [column(translate.indicators)],
-            [system.symbols[n] for n in replace],
-            [solution[n] for n in replace],
-        )[0]
+        shown = {name: final(expression) for name, expression in shown.items()}
+        table = _Table(self, states, solution, initial.settable, shown)
+        variables, algebraic, outputs = table.build()
         return CausalModel(
             flat=self.flat,
             states=tuple(states),
@@ -195,36 +261,113 @@ class _Builder:
             u=column([self.symbols[v.name] for v in self.inputs]),
             p=column([self.symbols[v.name] for v in self.parameters]),
             d=column([self.symbols[v.name] for v in self.dependents]),
-            m=column(translate.modes),
-            x_start=x_start,
-            rhs=rhs,
+            m=self._constant_between_events(),
+            x_start=initial.x_start,
+            rhs=column([solution[system.derivative_name(s)] for s in states]),
             w=algebraic,
             outputs=outputs,
-            g=indicators,
+            g=final(column(translate.indicators)),
             dependent=dependent,
-            initial=initial,
+            initial=initial.x,
+            events=self._events(final, x, states, reinits, initial),
+            blocks=system.blocks,
+            initial_blocks=initial.blocks,
+            y_start=initial.y_start,
+            assertions=final(column(asserted)),
         )
 
-    def _translated(self, residual: Expression) -> ca.SX:
-        try:
-            return self.translator.real(residual)
-        except ModelicaError as error:
-            raise ModelicaError(
-                f"{self.flat.name}: in the equation {equation_text(residual)}: {error}"
-            ) from error
+    def _give_a_state(self) -> None:
+        """A model with events and no state gets one: the stepping loop finds events on the way of the states."""
+        if self.system.has_derivatives or not (self.translator.modes or self.memory.samples):
+            return
+        name = "_time"
+        variable = FlatVariable(
+            name, "Real", "continuous", "local", None, None, "No state of the model: constant, for the solver", 0.0,
+            None, None, None, None, True, False, "default", False, "",
+        )  # fmt: skip
+        self.flat = replace(self.flat, variables={**self.flat.variables, name: variable})
+        self.symbols[name] = ca.SX.sym(name)
+        self.unknowns.append(variable)
+        self.system.add_variable(name, self.symbols[name], self._preference(variable))
+        self.system.add_equation(self.system.derivative(name), f"der({name}) = 0")
 
-    def _defines_boolean(self, residual: Expression) -> bool:
-        """Take ``b = condition`` out of the equations; b is inlined where it is used."""
-        body = residual.get("Binary", {})
-        target = body.get("lhs", {}).get("VarRef")
-        if body.get("op") != "Sub" or target is None:
-            return False
-        name = str(target["name"]["name"])
+    def _translated(self, equation: FlatEquation) -> ca.SX:
+        try:
+            return self.translator.real(equation.left) - self.translator.real(equation.right)
+        except ModelicaError as error:
+            raise ModelicaError(f"{equation.place}: in the equation {equation}: {error}") from error
+
+    def _at(self, place: str, value: Scalar) -> ca.SX:
+        try:
+            return self.translator.real(value)
+        except ModelicaError as error:
+            raise ModelicaError(f"{place}: in {text(value)}: {error}") from error
+
+    def _assertion(self, assertion: Assertion) -> ca.SX:
+        """Positive where the assertion is violated; assertions make no events."""
+        try:
+            return ca.logic_not(self.translator.real(assertion.condition, events=False))
+        except ModelicaError as error:
+            raise ModelicaError(f"{assertion.place}: in an assertion: {error}") from error
+
+    def _updates(self) -> None:
+        memory = self.memory
+        for variable in self.discretes:
+            if variable.name not in self.split.inline:
+                memory.updates[variable.name] = self._at(variable.place, self.split.definitions[variable.name])
+        for variable in self.free:
+            memory.updates[variable.name] = memory.values[variable.name]
+
+    def _finish_updates(self) -> None:
+        """Left limits of continuous variables come first."""
+        memory = self.memory
+        memory.names.sort(key=lambda name: name not in memory.left)
+
+    def _constant_between_events(self) -> ca.SX:
+        memory = self.memory
+        entries = list(self.translator.modes)
+        if self._eventful:
+            entries += [memory.values[n] for n in memory.names]
+            entries += [memory.before[n] for n in memory.names]
+            entries += [tick for *_, tick in memory.samples]
+            entries.append(memory.initial)
+        return column(entries)
+
+    @property
+    def _eventful(self) -> bool:
+        memory = self.memory
+        return bool(memory.names or memory.samples or memory.uses_initial or self.flat.reinits)
+
+    def _events(self, final, x: ca.SX, states: list[str], reinits, initial: "_Initial") -> Events:  # type: ignore[no-untyped-def]
+        memory = self.memory
+        fresh = [x.nz[i] for i in range(len(states))]
+        for reinit, condition, value in reversed(reinits):
+            if reinit.state not in states:
+                raise ModelicaError(
+                    f"{reinit.place}: reinit({reinit.state}, …): {reinit.state} is no state of the exported model; give "
+                    "it stateSelect=StateSelect.always."
+                )
+            k = states.index(reinit.state)
+            fresh[k] = ca.if_else(condition, value, fresh[k])
+        starts = [initial.free.get(n, self._z_start(n)) for n in memory.names]
+        samples = [ca.horzcat(start, interval) for start, interval, _ in memory.samples]
+        return Events(
+            z=tuple(memory.names),
+            left=len(memory.left),
+            update=final(column([memory.updates[n] for n in memory.names])),
+            z_start=final(column(starts)),
+            reinit=final(column(fresh)) if reinits else ca.SX(0, 1),
+            samples=ca.vertcat(*samples) if samples else ca.SX(0, 2),
+            used=self._eventful,
+        )
+
+    def _z_start(self, name: str) -> ca.SX:
+        if name in self.split.starts:
+            return self._at(self.flat.variables[name].place, self.split.starts[name])
         variable = self.flat.variables.get(name)
-        if variable is None or variable.type != "Boolean" or variable.variability != "continuous":
-            return False
-        self.booleans[name] = body["rhs"]
-        return True
+        if variable is None:
+            return self.memory.updates[name]
+        return self.translator.real(0.0 if variable.start is None else variable.start, events=False)
 
     @staticmethod
     def _preference(variable: FlatVariable) -> tuple[int, ...]:
@@ -240,11 +383,13 @@ class _Builder:
     def _dependent_values(self) -> ca.SX:
         """Calculated parameters in terms of those that can be set."""
         values = {
-            v.name: self.translator.real(v.binding or v.start or {"Literal": {"value": {"Real": 0.0}}})
+            v.name: self._at(v.place, v.binding if v.binding is not None else v.start or 0.0)
             for v in self.dependents
         }
         for _ in values:
             names = list(values)
+            if not {str(s) for s in ca.symvar(column(values.values()))} & set(names):
+                break
             expressions = ca.substitute(
                 list(values.values()), [self.symbols[n] for n in names], list(values.values())
             )
@@ -255,67 +400,104 @@ class _Builder:
             raise ModelicaError(f"{self.flat.name}: the parameter {min(cyclic)} depends on itself.")
         return dependent
 
-    def _initial(
-        self, states: list[str], equations: list[tuple[ca.SX, str]]
-    ) -> tuple[ca.SX, ca.SX, dict[str, float]]:
+    def _initial(self, states: list[str], equations: list[tuple[ca.SX, str]]) -> "_Initial":
         """Initial values of the states, the symbols of their start values, and the starts that may be set."""
-        flat = self.flat.variables
+        flat, system = self.flat.variables, self.system
         x_start = ca.SX.sym("x_start", len(states))
         required = list(equations)
         optional: list[tuple[ca.SX, str]] = []
         owner: dict[str, str] = {}
+        guesses: dict[str, ca.SX] = {}
         for variable in self.unknowns:
-            if variable.name not in states and variable.fixed is not True:
-                continue
-            settable = variable.name in states and not self._depends(variable.start)
+            name = variable.name
+            settable = name in states and not self._depends(variable.start)
             if settable:
-                start = x_start[states.index(variable.name)]
-            elif variable.start is not None:
-                start = self.translator.real(variable.start)
+                start = x_start[states.index(name)]
             else:
-                start = ca.SX(0)
-            label = f"{variable.name} = its start value"
+                start = self.translator.real(0.0 if variable.start is None else variable.start, events=False)
+            guesses[name] = start
+            if name not in states and variable.fixed is not True:
+                continue
+            label = f"{name} = its start value"
             if settable:
-                owner[label] = variable.name
-            (required if variable.fixed is True else optional).append(
-                (self.symbols[variable.name] - start, label)
-            )
-        solution, used = self.system.solve_initial(required, optional, self.flat.name)
-        initial = column([solution[name] for name in states])
-        settable_starts = {
-            owner[label]: self._evaluate(flat[owner[label]].start) or 0.0 for label in used if label in owner
-        }
-        return x_start, initial, settable_starts
+                owner[label] = name
+            (required if variable.fixed is True else optional).append((self.symbols[name] - start, label))
+        for variable in self.free:
+            guesses[variable.name] = self.translator.real(variable.start or 0.0, events=False)
+        free = {v.name: self.memory.values[v.name] for v in self.free}
+        result = system.solve_initial(required, optional, free, guesses, self.flat.name)
+        solution, used, blocks = result
+        values = {n: self._evaluate(flat[owner[label]].start) or 0.0 for label in used if label in owner for n in [owner[label]]}
+        touched = {str(s) for b in blocks for s in ca.symvar(b.guess)}
+        for index, name in enumerate(states):  # a start value that is only a guess can be set, too
+            if name not in values and str(x_start.nz[index]) in touched:
+                values[name] = self._evaluate(flat[name].start) or 0.0
+        return _Initial(
+            x_start=x_start,
+            x=column([solution[name] for name in states]),
+            settable=values,
+            blocks=blocks,
+            y_start=column([solution[n] for b in system.blocks for n in b.names]),
+            free={n: solution[n] for n in free},
+        )
 
-    def _variables(
-        self, states: list[str], solution: dict[str, ca.SX], settable: dict[str, float]
-    ) -> tuple[tuple[ModelVariable, ...], ca.SX, int]:
-        """The table of variables, and the column w of algebraic ones, outputs first."""
+
+@dataclass(frozen=True)
+class _Initial:
+    """The solution of the initial equations."""
+
+    x_start: ca.SX
+    x: ca.SX
+    settable: dict[str, float]
+    blocks: tuple[Block, ...]
+    y_start: ca.SX
+    free: dict[str, ca.SX]
+
+
+class _Table:
+    """Makes the table of variables."""
+
+    def __init__(
+        self,
+        builder: _Builder,
+        states: list[str],
+        solution: dict[str, ca.SX],
+        settable: dict[str, float],
+        shown: dict[str, ca.SX],
+    ) -> None:
+        self.builder, self.states, self.solution = builder, states, solution
+        self.settable, self.shown = settable, shown
+
+    def build(self) -> tuple[tuple[ModelVariable, ...], ca.SX, int]:
+        """The variables, and the column w of algebraic ones, outputs first."""
+        builder, states, solution = self.builder, self.states, self.solution
         place: dict[int, tuple[str, int]] = {}
         columns = (
-            ("state", [self.system.symbols[s] for s in states]),
-            ("derivative", [solution[self.system.derivative_name(s)] for s in states]),
-            ("input", [self.symbols[v.name] for v in self.inputs]),
+            ("state", [builder.system.symbols[s] for s in states]),
+            ("derivative", [solution[builder.system.derivative_name(s)] for s in states]),
+            ("input", [builder.symbols[v.name] for v in builder.inputs]),
         )
         for kind, entries in columns:
             for index, expression in enumerate(entries):
                 place.setdefault(expression.element_hash(), (kind, index))
         made: list[ModelVariable] = []
         for kind, group in (
-            ("input", self.inputs),
-            ("parameter", self.parameters),
-            ("dependent", self.dependents),
+            ("input", builder.inputs),
+            ("parameter", builder.parameters),
+            ("dependent", builder.dependents),
         ):
             made += [self._variable(v, kind, i, self._start(v, kind)) for i, v in enumerate(group)]
         algebraic: list[ca.SX] = []
-        ordered = sorted(self.unknowns, key=lambda v: v.causality != "output")
+        ordered = sorted(
+            (*builder.unknowns, *builder.discretes, *builder.free), key=lambda v: v.causality != "output"
+        )
         outputs = 0
         for variable in ordered:
             name = variable.name
             if name in states:
-                made.append(self._variable(variable, "state", states.index(name), settable.get(name)))
+                made.append(self._variable(variable, "state", states.index(name), self.settable.get(name)))
                 continue
-            expression = solution[name]
+            expression = self._expression(name)
             found = place.get(expression.element_hash()) if variable.causality != "output" else None
             if found is None:
                 found = ("algebraic", len(algebraic))
@@ -325,30 +507,28 @@ class _Builder:
                 elif not expression.is_constant():
                     place.setdefault(expression.element_hash(), found)
             made.append(self._variable(variable, found[0], found[1], None))
-        for index, state in enumerate(states):
-            unit = self.flat.variables[state].unit
-            made.append(
-                ModelVariable(
-                    f"der({state})",
-                    "derivative",
-                    index,
-                    "local",
-                    _rate(unit),
-                    f"Time derivative of {state}",
-                    None,
-                    None,
-                    None,
-                    None,
-                )
-            )
+        made += [self._derivative(index, state) for index, state in enumerate(states)]
         return tuple(made), column(algebraic), outputs
+
+    def _expression(self, name: str) -> ca.SX:
+        if name in self.solution:
+            return self.solution[name]
+        return self.shown[name] if name in self.shown else self.builder.symbols[name]
+
+    def _derivative(self, index: int, state: str) -> ModelVariable:
+        return ModelVariable(
+            f"der({state})", "derivative", index, "local", _rate(self.builder.flat.variables[state].unit),
+            f"Time derivative of {state}", None, None, None, None,
+        )  # fmt: skip
 
     def _start(self, variable: FlatVariable, kind: str) -> float | None:
         if kind == "dependent":
             return None
-        return self._evaluate(variable.binding or variable.start) or 0.0
+        given = variable.start if variable.binding is None else variable.binding
+        return self.builder._evaluate(given) or 0.0
 
     def _variable(self, variable: FlatVariable, kind: str, index: int, start: float | None) -> ModelVariable:
+        evaluate = self.builder._evaluate
         return ModelVariable(
             name=variable.name,
             kind=kind,
@@ -357,9 +537,10 @@ class _Builder:
             unit=variable.unit,
             description=variable.description,
             start=start,
-            minimum=self._evaluate(variable.minimum),
-            maximum=self._evaluate(variable.maximum),
-            nominal=self._evaluate(variable.nominal),
+            minimum=evaluate(variable.minimum),
+            maximum=evaluate(variable.maximum),
+            nominal=evaluate(variable.nominal),
+            discrete=variable.variability == "discrete",
         )
 
 
@@ -367,16 +548,6 @@ def column(entries: Iterable[ca.SX]) -> ca.SX:
     """A column of scalars that stays an SX when it is empty."""
     listed = list(entries)
     return ca.vertcat(*listed) if listed else ca.SX(0, 1)
-
-
-def _children(expression: Expression) -> list[Expression]:
-    body = next(iter(expression.values()))
-    if not isinstance(body, dict):
-        return []
-    parts = [body[key] for key in ("lhs", "rhs", "else_branch") if body.get(key)]
-    parts += body.get("args", [])
-    parts += [part for branch in body.get("branches", []) for part in branch]
-    return parts
 
 
 def _rate(unit: str | None) -> str | None:

@@ -206,7 +206,8 @@ def _attributes(model: CausalModel, variable: ModelVariable) -> tuple[dict[str, 
         attributes |= {"causality": "calculatedParameter", "variability": "tunable", "initial": "calculated"}
     else:
         initial = "exact" if variable.kind == "state" and variable.start is not None else "calculated"
-        attributes |= {"causality": variable.causality, "variability": "continuous", "initial": initial}
+        variability = "discrete" if variable.discrete else "continuous"
+        attributes |= {"causality": variable.causality, "variability": variability, "initial": initial}
     if variable.start is not None:
         real["start"] = repr(float(variable.start))
     if variable.unit:

@@ -1,51 +1,48 @@
-"""Flat Modelica expressions → CasADi expressions, with relations turned into modes.
+"""Terms → CasADi expressions; what changes at events only becomes a symbol of its own.
 
 A relation such as ``v > v_r`` that depends on a continuous variable becomes a *mode* m (0 or 1) with an event
-indicator g = v - v_r; the mode is frozen between events (Modelica Language Specification 3.6, 8.5). Inside
-``noEvent`` and over parameters alone the relation is evaluated where it stands.
+indicator g = v - v_r; the mode is frozen between events (Modelica Language Specification 3.6, 8.5). ``v >= v_r`` is the
+negation of ``v < v_r``, so that it holds where g is 0. Inside ``noEvent`` and over what is discrete the relation is
+evaluated where it stands. ``pre``, ``edge``, ``sample`` and ``integer`` use the discrete variables of `Memory`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import casadi as ca
 
 from thsa_cosim.errors import ModelicaError
-from thsa_cosim.export.flatten import Expression
+from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, text
 
 _UNARY: dict[str, Callable[[ca.SX], ca.SX]] = {
-    "Sin": ca.sin,
-    "Cos": ca.cos,
-    "Tan": ca.tan,
-    "Asin": ca.asin,
-    "Acos": ca.acos,
-    "Atan": ca.atan,
-    "Sinh": ca.sinh,
-    "Cosh": ca.cosh,
-    "Tanh": ca.tanh,
-    "Exp": ca.exp,
-    "Log": ca.log,
-    "Log10": ca.log10,
-    "Sqrt": ca.sqrt,
+    "sin": ca.sin,
+    "cos": ca.cos,
+    "tan": ca.tan,
+    "asin": ca.asin,
+    "acos": ca.acos,
+    "atan": ca.atan,
+    "sinh": ca.sinh,
+    "cosh": ca.cosh,
+    "tanh": ca.tanh,
+    "exp": ca.exp,
+    "log": ca.log,
+    "log10": ca.log10,
+    "sqrt": ca.sqrt,
+    "neg": lambda a: -a,
+    "not": ca.logic_not,
 }
-_ARITHMETIC: dict[str, Callable[[ca.SX, ca.SX], ca.SX]] = {
-    "Add": lambda a, b: a + b,
-    "Sub": lambda a, b: a - b,
-    "Mul": lambda a, b: a * b,
-    "Div": lambda a, b: a / b,
-    "Exp": lambda a, b: power(a, b),
-    "AddElem": lambda a, b: a + b,
-    "SubElem": lambda a, b: a - b,
-    "MulElem": lambda a, b: a * b,
-    "DivElem": lambda a, b: a / b,
-    "ExpElem": lambda a, b: power(a, b),
+_BINARY: dict[str, Callable[[ca.SX, ca.SX], ca.SX]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": lambda a, b: a / b,
+    "^": lambda a, b: power(a, b),
+    "and": ca.logic_and,
+    "or": ca.logic_or,
+    "atan2": ca.atan2,
 }
-_RELATIONS = {"Gt": 1, "Ge": 1, "Lt": -1, "Le": -1}
-_SYMBOLS = {
-    "Add": "+", "Sub": "-", "Mul": "*", "Div": "/", "Exp": "^", "Gt": ">", "Ge": ">=", "Lt": "<", "Le": "<=",
-    "And": "and", "Or": "or", "Eq": "==", "Neq": "<>",
-}  # fmt: skip
+_RELATIONS = frozenset(("<", "<=", ">", ">="))
+_WHOLE = frozenset(("floor", "ceil", "integer", "div", "mod", "rem"))
 
 
 def power(base: ca.SX, exponent: ca.SX) -> ca.SX:
@@ -59,68 +56,135 @@ def power(base: ca.SX, exponent: ca.SX) -> ca.SX:
 
 
 @dataclass
+class Memory:
+    """Discrete variables by name, each with the symbols of its value and of its value before the event.
+
+    ``updates`` holds the new value at an event; ``left`` names those that only keep the left limit of a continuous
+    variable; ``samples`` are pairs (start, interval) with the symbol that is 1 when they are due.
+    """
+
+    names: list[str] = field(default_factory=list)
+    values: dict[str, ca.SX] = field(default_factory=dict)
+    before: dict[str, ca.SX] = field(default_factory=dict)
+    updates: dict[str, ca.SX] = field(default_factory=dict)
+    left: set[str] = field(default_factory=set)
+    samples: list[tuple[ca.SX, ca.SX, ca.SX]] = field(default_factory=list)
+    initial: ca.SX = field(default_factory=lambda: ca.SX.sym("initial()"))
+    uses_initial: bool = False
+
+    def add(self, name: str) -> ca.SX:
+        """A discrete variable; returns the symbol of its value."""
+        if name not in self.values:
+            self.names.append(name)
+            self.values[name] = ca.SX.sym(f"now({name})")
+            self.before[name] = ca.SX.sym(f"pre({name})")
+        return self.values[name]
+
+    def is_initial(self) -> ca.SX:
+        """1 while the initial values are being found."""
+        self.uses_initial = True
+        return self.initial
+
+    def symbols(self) -> set[str]:
+        """Names of the symbols that change at events only."""
+        held = [*self.values.values(), *self.before.values(), *(tick for *_, tick in self.samples), self.initial]
+        return {str(symbol) for symbol in held}
+
+
+@dataclass
 class Translator:
-    """Translates expressions of one model and collects the modes that their relations need.
+    """Translates terms of one model and collects the modes that their relations need.
 
     ``symbols`` maps names to CasADi symbols or values; ``derivatives`` maps names to the symbols of their time
     derivatives; ``discrete`` names the symbols (parameters, constants) whose relations need no event. ``inline``
-    holds Boolean variables by their defining expression.
+    holds Boolean and Integer variables by their defining expression.
     """
 
     symbols: dict[str, ca.SX]
     derivatives: Callable[[str], ca.SX]
     discrete: frozenset[str]
-    inline: dict[str, Expression] = field(default_factory=dict)
+    inline: dict[str, Scalar] = field(default_factory=dict)
+    memory: Memory = field(default_factory=Memory)
     modes: list[ca.SX] = field(default_factory=list)
     indicators: list[ca.SX] = field(default_factory=list)
+    _done: dict[tuple[int, bool], ca.SX] = field(default_factory=dict)
+    _kept: list[Term] = field(default_factory=list)
+    _pending: set[str] = field(default_factory=set)
+    _floors: list[tuple[ca.SX, ca.SX]] = field(default_factory=list)
 
-    def real(self, expression: Expression, events: bool = True) -> ca.SX:
-        """Translate a Real or Integer expression; raises ModelicaError for what is not supported."""
-        kind, body = next(iter(expression.items()))
-        if kind == "Literal":
-            value = next(iter(body["value"].values()))
+    def real(self, value: Scalar, events: bool = True) -> ca.SX:
+        """Translate a scalar (a Boolean becomes 0 or 1); raises ModelicaError for what is not supported."""
+        if isinstance(value, Enumeration):
+            return ca.SX(float(value.index))
+        if not isinstance(value, Term):
+            if isinstance(value, str) or value is None:
+                raise ModelicaError(f"a number is needed, not {value!r}.")
             return ca.SX(float(value))
-        if kind == "VarRef":
-            return self._variable(reference(expression), events)
-        if kind == "Unary":
-            operand = self.real(body["rhs"], events)
-            if body["op"] == "Minus":
-                return -operand
-            if body["op"] == "Plus":
-                return operand
-        if kind == "Binary" and body["op"] in _ARITHMETIC:
-            return _ARITHMETIC[body["op"]](self.real(body["lhs"], events), self.real(body["rhs"], events))
-        if kind == "If":
-            return self._if(body, events)
-        if kind == "BuiltinCall":
-            return self._call(body, events)
-        raise ModelicaError(f"The expression {text(expression)} ({kind}) is not supported by the exporter.")
+        key = (id(value), events)
+        if key not in self._done:
+            self._kept.append(value)
+            self._done[key] = self._translate(value, events)
+        return self._done[key]
 
-    def condition(self, expression: Expression, events: bool = True) -> ca.SX:
-        """Translate a Boolean expression to 0/1."""
-        kind, body = next(iter(expression.items()))
-        if kind == "Literal" and "Boolean" in body["value"]:
-            return ca.SX(float(body["value"]["Boolean"]))
-        if kind == "VarRef":
-            return self._variable(reference(expression), events)
-        if kind == "Unary" and body["op"] == "Not":
-            return ca.logic_not(self.condition(body["rhs"], events))
-        if kind == "Binary":
-            if body["op"] == "And":
-                return ca.logic_and(self.condition(body["lhs"], events), self.condition(body["rhs"], events))
-            if body["op"] == "Or":
-                return ca.logic_or(self.condition(body["lhs"], events), self.condition(body["rhs"], events))
-            if body["op"] in _RELATIONS:
-                difference = self.real(body["lhs"], events) - self.real(body["rhs"], events)
-                return self._relation(_RELATIONS[body["op"]] * difference, events, body["op"] in ("Ge", "Le"))
-        if kind == "BuiltinCall" and body["function"] == "NoEvent":
-            return self.condition(body["args"][0], events=False)
-        raise ModelicaError(f"The condition {text(expression)} is not supported by the exporter.")
+    def _translate(self, term: Term, events: bool) -> ca.SX:
+        op, args = term.op, term.args
+        if op == "ref":
+            return self._variable(args[0], events)
+        if op in _BINARY:
+            return _BINARY[op](self.real(args[0], events), self.real(args[1], events))
+        if op in _UNARY:
+            return _UNARY[op](self.real(args[0], events))
+        if op in _RELATIONS:
+            a, b = (self.real(x, events) for x in args)
+            return self._ordered(op, a, b, events)
+        if op in ("==", "<>"):
+            return self._equal(op, *(self.real(x, events) for x in args), events=events)
+        if op == "if":
+            condition = self.real(args[0], events)
+            return select(condition, self.real(args[1], events), self.real(args[2], events))
+        if op == "noEvent":
+            return self.real(args[0], events=False)
+        if op in ("start", "smooth"):
+            return self.real(args[-1], events)
+        if op in ("max", "min", "abs", "sign"):
+            return self._kinked(op, [self.real(a, events) for a in args], events)
+        if op == "der":
+            return self._derivative(args[0], events)
+        if op in _WHOLE:
+            return self._rounded(op, [self.real(a, events) for a in args], events)
+        return self._discrete(term)
 
-    def _relation(self, difference: ca.SX, events: bool, inclusive: bool) -> ca.SX:
-        timeless = all(str(symbol) in self.discrete for symbol in ca.symvar(difference))
-        if timeless or not events:
-            return difference >= 0 if inclusive else difference > 0
+    def _discrete(self, term: Term) -> ca.SX:
+        op, args = term.op, term.args
+        if op == "initial":
+            return self.memory.is_initial()
+        if op == "pre":
+            return self._before(args[0])
+        if op == "change":
+            return ca.if_else(self.real(args[0]) == self._before(args[0]), 0, 1)
+        if op == "edge":
+            now, before = self.real(args[0]), self._before(args[0])
+            return ca.logic_and(ca.logic_and(now, ca.logic_not(before)), ca.logic_not(self.memory.is_initial()))
+        if op == "sample":
+            return self._sample(*(self.real(a) for a in args))
+        raise ModelicaError(f"the function {op}() is a limit of this exporter.")
+
+    # -- relations
+
+    def _timeless(self, expression: ca.SX) -> bool:
+        held = self.memory.symbols()
+        return all(str(s) in self.discrete or str(s) in held for s in ca.symvar(expression))
+
+    def _ordered(self, op: str, a: ca.SX, b: ca.SX, events: bool) -> ca.SX:
+        difference = a - b if op in (">", "<=") else b - a
+        if not events or self._timeless(difference):
+            inclusive = op in ("<=", ">=")
+            side = -difference if inclusive else difference
+            return side >= 0 if inclusive else side > 0
+        mode = self._mode(difference)
+        return ca.logic_not(mode) if op in ("<=", ">=") else mode
+
+    def _mode(self, difference: ca.SX) -> ca.SX:
         for mode, indicator in zip(self.modes, self.indicators, strict=True):
             if ca.is_equal(indicator, difference, 20):
                 return mode
@@ -129,56 +193,112 @@ class Translator:
         self.indicators.append(difference)
         return mode
 
+    def _equal(self, op: str, a: ca.SX, b: ca.SX, *, events: bool) -> ca.SX:
+        if events and not self._timeless(a - b):
+            raise ModelicaError("two Reals that vary in time are compared with == or <>, which has no event.")
+        return a == b if op == "==" else a != b
+
+    # -- variables
+
     def _variable(self, name: str, events: bool) -> ca.SX:
         if name in self.inline:
-            return self.condition(self.inline[name], events)
+            if name in self._pending:
+                raise ModelicaError(f"{name} depends on itself.")
+            self._pending.add(name)
+            try:
+                return self.real(self.inline[name], events)
+            finally:
+                self._pending.discard(name)
         if name not in self.symbols:
-            raise ModelicaError(
-                f"The variable {name} is not a scalar that the exporter knows; whole vectors are not supported."
-            )
+            raise ModelicaError(f"the variable {name} has no value that the exporter knows.")
         return self.symbols[name]
 
-    def _if(self, body: dict[str, Any], events: bool) -> ca.SX:
-        result = self.real(body["else_branch"], events)
-        for condition, branch in reversed(body["branches"]):
-            result = select(self.condition(condition, events), self.real(branch, events), result)
+    def _derivative(self, argument: Scalar, events: bool) -> ca.SX:
+        if isinstance(argument, Term) and argument.op == "ref":
+            name = argument.args[0]
+            if str(self.symbols.get(name, "")) in self.discrete:
+                return ca.SX(0)
+            return self.derivatives(name)
+        expression = self.real(argument, events)
+        result = ca.SX(0)
+        names = {str(symbol): name for name, symbol in self.symbols.items()}
+        for symbol in ca.symvar(expression):
+            name = names.get(str(symbol), str(symbol))
+            if str(symbol) in self.discrete or name not in self.symbols:
+                continue
+            rate = ca.SX(1) if name == "time" else self.derivatives(name)
+            result += ca.jacobian(expression, symbol) * rate
         return result
 
-    def _call(self, body: dict[str, Any], events: bool) -> ca.SX:
-        function, arguments = body["function"], body["args"]
-        if function == "Der":
-            kind = next(iter(arguments[0]))
-            if kind != "VarRef":
-                raise ModelicaError(
-                    f"der({text(arguments[0])}) is the derivative of an expression; name the expression first."
-                )
-            return self.derivatives(reference(arguments[0]))
-        if function in _UNARY:
-            return _UNARY[function](self.real(arguments[0], events))
-        if function == "Atan2":
-            return ca.atan2(self.real(arguments[0], events), self.real(arguments[1], events))
-        if function == "NoEvent":
-            return self.real(arguments[0], events=False)
-        if function == "Smooth":
-            return self.real(arguments[1], events)
-        if function == "Homotopy":
-            return self.real(arguments[0], events)
-        if function in ("Max", "Min", "Abs", "Sign") and len(arguments) <= 2:
-            return self._kinked(function, [self.real(argument, events) for argument in arguments], events)
-        raise ModelicaError(
-            f"The function {function.lower()}() in {text({'BuiltinCall': body})} is not supported by the exporter."
-        )
+    def _before(self, argument: Scalar) -> ca.SX:
+        """pre(): of a discrete variable its value before the event, of any other expression its left limit."""
+        memory = self.memory
+        if isinstance(argument, Term) and argument.op == "ref" and argument.args[0] in memory.before:
+            return memory.before[argument.args[0]]
+        if isinstance(argument, Term) and argument.op == "not":
+            return ca.logic_not(self._before(argument.args[0]))
+        expression = self.real(argument)
+        if expression.is_constant():
+            return expression
+        for name, update in memory.updates.items():
+            if ca.is_equal(update, expression, 20):
+                return memory.before[name]
+        held = memory.symbols() | {str(m) for m in self.modes}
+        discrete = all(str(s) in self.discrete or str(s) in held for s in ca.symvar(expression))
+        name = f"_{'condition' if discrete else 'left'}[{len(memory.names) + 1}]"
+        memory.add(name)
+        memory.updates[name] = expression
+        if not discrete:
+            memory.left.add(name)
+        return memory.before[name]
+
+    def _sample(self, start: ca.SX, interval: ca.SX) -> ca.SX:
+        for known_start, known_interval, tick in self.memory.samples:
+            if ca.is_equal(known_start, start, 20) and ca.is_equal(known_interval, interval, 20):
+                return tick
+        tick = ca.SX.sym(f"tick[{len(self.memory.samples)}]")
+        self.memory.samples.append((start, interval, tick))
+        return tick
+
+    def _rounded(self, op: str, values: list[ca.SX], events: bool) -> ca.SX:
+        if op in ("floor", "integer"):
+            return self._floor(values[0], events)
+        if op == "ceil":
+            return -self._floor(-values[0], events)
+        a, b = values
+        quotient = a / b
+        if op == "mod":
+            return a - self._floor(quotient, events) * b
+        above = self._ordered(">=", quotient, ca.SX(0), events)
+        whole = select(above, self._floor(quotient, events), -self._floor(-quotient, events))
+        return whole if op == "div" else a - whole * b
+
+    def _floor(self, value: ca.SX, events: bool) -> ca.SX:
+        """The largest whole number not above the value; a discrete variable whose steps are events."""
+        if not events or self._timeless(value):
+            return ca.floor(value)
+        for known, symbol in self._floors:
+            if ca.is_equal(known, value, 20):
+                return symbol
+        name = f"_floor[{len(self.memory.names) + 1}]"
+        now = self.memory.add(name)
+        self._floors.append((value, now))
+        above = ca.logic_not(self._mode(now + 1 - value))
+        below = self._mode(now - value)
+        step = select(above, ca.fmax(now + 1, ca.floor(value)), select(below, ca.fmin(now - 1, ca.floor(value)), now))
+        self.memory.updates[name] = select(self.memory.is_initial(), ca.floor(value), step)
+        return now
 
     def _kinked(self, function: str, values: list[ca.SX], events: bool) -> ca.SX:
         first, second = values if len(values) == 2 else (values[0], ca.SX(0))
-        above = self._relation(first - second, events, inclusive=False)
-        if function == "Max":
+        above = self._ordered(">", first, second, events)
+        if function == "max":
             return select(above, first, second)
-        if function == "Min":
+        if function == "min":
             return select(above, second, first)
-        if function == "Abs":
+        if function == "abs":
             return select(above, first, -first)
-        below = self._relation(-first, events, inclusive=False)
+        below = self._ordered(">", -first, ca.SX(0), events)
         return above - below
 
 
@@ -189,42 +309,4 @@ def select(condition: ca.SX, yes: ca.SX, no: ca.SX) -> ca.SX:
     return ca.if_else(condition, yes, no)
 
 
-def reference(expression: Expression) -> str:
-    """Name of a VarRef with literal subscripts, such as ``motor.w`` or ``x[2]``."""
-    body = expression["VarRef"]
-    name = str(body["name"]["name"])
-    for subscript in body["subscripts"]:
-        index = subscript.get("Index", {}).get("value")
-        if not isinstance(index, int):
-            raise ModelicaError(
-                f"The subscript of {name} is not a number; the exporter needs fixed subscripts."
-            )
-        name += f"[{index}]"
-    return name
-
-
-def text(expression: Expression) -> str:
-    """An expression as Modelica text, for messages."""
-    kind, body = next(iter(expression.items()))
-    if kind == "Literal":
-        return str(next(iter(body["value"].values())))
-    if kind == "VarRef":
-        return str(body["name"]["name"])
-    if kind == "Unary":
-        return {"Minus": "-", "Not": "not "}.get(body["op"], "") + text(body["rhs"])
-    if kind == "Binary":
-        return f"({text(body['lhs'])} {_SYMBOLS.get(body['op'], body['op'])} {text(body['rhs'])})"
-    if kind == "BuiltinCall":
-        return f"{body['function'].lower()}({', '.join(text(a) for a in body['args'])})"
-    if kind == "If":
-        branches = " else".join(f"if {text(c)} then {text(b)}" for c, b in body["branches"])
-        return f"{branches} else {text(body['else_branch'])}"
-    return kind
-
-
-def equation_text(residual: Expression) -> str:
-    """A residual as ``lhs = rhs``."""
-    body = residual.get("Binary")
-    if body is not None and body["op"] == "Sub":
-        return f"{text(body['lhs'])} = {text(body['rhs'])}"
-    return f"{text(residual)} = 0"
+__all__ = ["Memory", "Translator", "power", "select", "text"]

@@ -3,12 +3,15 @@
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from thsa_cosim.errors import ModelicaError
 
 
-def export_with_openmodelica(model: str, package: Path, fmi: int, output: Path | None) -> Path:
+def export_with_openmodelica(
+    model: str, package: Path, fmi: int, output: Path | None, libraries: Sequence[Path] = ()
+) -> Path:
     """Hand a class to ``omc`` (``buildModelFMU``); raises ModelicaError when omc is missing or refuses it."""
     omc = shutil.which("omc")
     if omc is None:
@@ -19,11 +22,15 @@ def export_with_openmodelica(model: str, package: Path, fmi: int, output: Path |
         raise ModelicaError("--compiler omc exports FMI 2 only; use --fmi 2 or leave --compiler out.")
     from thsa_cosim.export.flatten import locate
 
-    file, name = locate(model, package)
+    file, name = locate(model, package, libraries)
     target = (output or Path(name.rsplit(".", 1)[-1] + ".fmu")).resolve()
     loads = (
         [f'loadFile("{(package / "package.mo").resolve()}");'] if (package / "package.mo").is_file() else []
     )
+    for library in libraries:
+        top = library / "package.mo" if library.is_dir() else library
+        if top.is_file():
+            loads.append(f'loadFile("{top.resolve()}");')
     if not name.startswith(package.name + "."):
         loads.append(f'loadFile("{file.resolve()}");')
     lines = [

@@ -1,10 +1,24 @@
 """The equation system of one model: state selection, block order and symbolic solution."""
 
+from dataclasses import dataclass
+
 import casadi as ca
 import numpy as np
 
 from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export.structure import Incidence, blocks, match, reduce_index
+
+LARGEST_SYMBOLIC = 3
+
+
+@dataclass(frozen=True)
+class Block:
+    """Equations that are solved by Newton's method while the model runs: ``residual(unknown) = 0``."""
+
+    names: tuple[str, ...]
+    unknown: ca.SX
+    residual: ca.SX
+    guess: ca.SX
 
 
 class EquationSystem:
@@ -20,6 +34,7 @@ class EquationSystem:
         self._columns: dict[str, int] = {}
         self._preference: dict[str, tuple[int, ...]] = {}
         self._derivatives: dict[str, str] = {}
+        self.blocks: tuple[Block, ...] = ()
 
     def add_variable(self, name: str, symbol: ca.SX, preference: tuple[int, ...] = (-1,)) -> int:
         """Add an unknown; the higher ``preference`` sorts, the rather it becomes a state."""
@@ -29,11 +44,16 @@ class EquationSystem:
         self._preference[name] = preference
         return self._columns[name]
 
-    def add_equation(self, residual: ca.SX, label: str) -> int:
-        """Add a residual that is zero; ``label`` is its text for messages."""
+    def add_equation(self, residual: ca.SX, label: str, place: str = "") -> int:
+        """Add a residual that is zero; ``label`` is its text for messages, ``place`` its file and line."""
         self.residuals.append(residual)
-        self.labels.append(label)
+        self.labels.append(f"{label} ({place})" if place else label)
         return len(self.residuals) - 1
+
+    @property
+    def has_derivatives(self) -> bool:
+        """Whether any unknown is differentiated."""
+        return bool(self._derivatives)
 
     def derivative_name(self, name: str) -> str:
         """Name of the time derivative of an unknown."""
@@ -51,14 +71,14 @@ class EquationSystem:
 
     def prepare(self, model: str) -> list[str]:
         """Differentiate constraints where needed and choose the states; returns their names in order."""
-        incidence = [self._incidence(residual) for residual in self.residuals]
+        incidence = [self.incidence(residual) for residual in self.residuals]
         self._check_regular(incidence, model)
         derivative_of = {self._columns[n]: self._columns[d] for n, d in self._derivatives.items()}
 
         def differentiate_equation(row: int) -> set[int]:
             residual = self._differentiate(row, model)
             self.add_equation(residual, f"der({self.labels[row]})")
-            return self._incidence(residual)
+            return self.incidence(residual)
 
         def differentiate_variable(column: int) -> int:
             self.derivative(self.names[column])
@@ -86,17 +106,48 @@ class EquationSystem:
             )
         return [name for name in self.names if name in chosen]
 
-    def solve(self, states: list[str], model: str) -> dict[str, ca.SX]:
-        """Every unknown that is no state, in terms of states, inputs, parameters, modes and time."""
-        return self._solve_blocks(self._rows, self.residuals, self.labels, self._matching, model)
+    def solve(self, model: str) -> dict[str, ca.SX]:
+        """Every unknown that is no state, in terms of states, inputs, parameters, modes, time and ``blocks``."""
+        solver = _Solver(self, self._rows, self.residuals, self.labels, model)
+        solution = solver.solve(self._matching)
+        self.blocks = tuple(solver.blocks)
+        return solution
 
     def solve_initial(
-        self, required: list[tuple[ca.SX, str]], optional: list[tuple[ca.SX, str]], model: str
-    ) -> tuple[dict[str, ca.SX], list[str]]:
-        """Solve for all unknowns with the initial equations; returns the solution and the labels that were used."""
+        self,
+        required: list[tuple[ca.SX, str]],
+        optional: list[tuple[ca.SX, str]],
+        free: dict[str, ca.SX],
+        guesses: dict[str, ca.SX],
+        model: str,
+    ) -> tuple[dict[str, ca.SX], list[str], tuple[Block, ...]]:
+        """Solve for all unknowns, and the ``free`` parameters, with the initial equations.
+
+        Returns the solution, the labels of the equations that were used, and the implicit blocks, whose unknowns are
+        symbols of their own.
+        """
+        names, symbols = list(self.names), dict(self.symbols)
+        for name, symbol in free.items():
+            self._columns[name] = self._columns[str(symbol)] = len(self.names)
+            self.names.append(name)
+            self.symbols[name] = symbol
+        try:
+            return self._solve_initial(required, optional, guesses, model)
+        finally:
+            for name, symbol in free.items():
+                del self._columns[name], self._columns[str(symbol)]
+            self.names, self.symbols = names, symbols
+
+    def _solve_initial(
+        self,
+        required: list[tuple[ca.SX, str]],
+        optional: list[tuple[ca.SX, str]],
+        guesses: dict[str, ca.SX],
+        model: str,
+    ) -> tuple[dict[str, ca.SX], list[str], tuple[Block, ...]]:
         residuals = [*self.residuals, *[r for r, _ in required]]
         labels = [*self.labels, *[t for _, t in required]]
-        rows = [self._incidence(residual) for residual in residuals]
+        rows = [self.incidence(residual) for residual in residuals]
         columns = list(range(len(self.names)))
         matching = self._match_rows(rows)
         unmatched = set(range(len(rows))) - set(matching.values())
@@ -108,7 +159,7 @@ class EquationSystem:
         for residual, label in optional:
             if len(rows) == len(columns):
                 break
-            trial = [*rows, self._incidence(residual)]
+            trial = [*rows, self.incidence(residual)]
             extended = self._match_rows(trial)
             if len(extended) == len(trial):
                 rows, matching = trial, extended
@@ -120,12 +171,14 @@ class EquationSystem:
                 f"{model}: nothing determines the initial value of {missing[0]}; give it a start value with fixed=true."
             )
         used = labels[len(self.labels) :]
-        return self._solve_blocks(rows, residuals, labels, matching, model), used
+        solver = _Solver(self, rows, residuals, labels, model, guesses)
+        return solver.solve(matching), used, tuple(solver.blocks)
 
     def _match_rows(self, rows: Incidence) -> dict[int, int]:
         return match(rows, range(len(self.names)))
 
-    def _incidence(self, residual: ca.SX) -> set[int]:
+    def incidence(self, residual: ca.SX) -> set[int]:
+        """Columns of the unknowns that a residual depends on."""
         return {self._columns[str(s)] for s in ca.symvar(residual) if str(s) in self._columns}
 
     def _differentiate(self, row: int, model: str) -> ca.SX:
@@ -162,29 +215,108 @@ class EquationSystem:
         if spare:
             raise ModelicaError(f"{model}: too many equations: {self.labels[spare[0]]} is one too many.")
 
-    def _solve_blocks(
-        self, rows: Incidence, residuals: list[ca.SX], labels: list[str], matching: dict[int, int], model: str
-    ) -> dict[str, ca.SX]:
-        solution: dict[str, ca.SX] = {}
+
+class _Solver:
+    """Solves the blocks of one system in their order."""
+
+    def __init__(
+        self,
+        system: EquationSystem,
+        rows: Incidence,
+        residuals: list[ca.SX],
+        labels: list[str],
+        model: str,
+        guesses: dict[str, ca.SX] | None = None,
+    ) -> None:
+        self.system, self.rows, self.residuals, self.labels = system, rows, residuals, labels
+        self.model, self.guesses = model, guesses
+        self.solution: dict[str, ca.SX] = {}
+        self.blocks: list[Block] = []
+
+    def solve(self, matching: dict[int, int]) -> dict[str, ca.SX]:
+        """Name → expression for every matched unknown."""
+        system, rows = self.system, self.rows
         for block in blocks(rows, matching):
-            known = {self.names[c] for r, _ in block for c in rows[r]} & solution.keys()
-            symbols, values = [self.symbols[n] for n in known], [solution[n] for n in known]
-            residual = ca.vertcat(*ca.substitute([residuals[r] for r, _ in block], symbols, values))
-            names = [self.names[c] for _, c in block]
-            unknown = ca.vertcat(*[self.symbols[n] for n in names])
+            known = {system.names[c] for r, _ in block for c in rows[r]} & self.solution.keys()
+            symbols, values = [system.symbols[n] for n in known], [self.solution[n] for n in known]
+            residual = ca.vertcat(*ca.substitute([self.residuals[r] for r, _ in block], symbols, values))
+            names = [system.names[c] for _, c in block]
+            listed = "; ".join(self.labels[r] for r, _ in block[:4])
+            self._solve(residual, names, listed)
+        return self.solution
+
+    def _solve(self, residual: ca.SX, names: list[str], listed: str) -> None:
+        unknown = ca.vertcat(*[self.system.symbols[n] for n in names])
+        matrix = ca.jacobian(residual, unknown)
+        linear = not ca.depends_on(matrix, unknown)
+        if linear and matrix.is_constant() and np.linalg.matrix_rank(np.array(ca.DM(matrix))) < len(names):
+            raise ModelicaError(
+                f"{self.model}: singular: {', '.join(names[:6])} cannot be solved from {listed}."
+            )
+        if linear and len(names) <= LARGEST_SYMBOLIC:
+            constant = ca.substitute([residual], [unknown], [ca.SX.zeros(len(names))])[0]
+            self.solution.update(zip(names, ca.vertsplit(_linear_solve(matrix, constant)), strict=True))
+            return
+        eliminated, residual, rest = _torn(residual, names, self.system.symbols)
+        if rest:
+            self._reduced(residual, rest, linear)
+        symbols = [self.system.symbols[n] for n in rest]
+        values = [self.solution[n] for n in rest]
+        for name, expression in reversed(eliminated):
+            self.solution[name] = ca.substitute([expression], symbols, values)[0]
+            symbols.append(self.system.symbols[name])
+            values.append(self.solution[name])
+
+    def _reduced(self, residual: ca.SX, names: list[str], linear: bool) -> None:
+        unknown = ca.vertcat(*[self.system.symbols[n] for n in names])
+        if linear and len(names) <= LARGEST_SYMBOLIC:
             matrix = ca.jacobian(residual, unknown)
-            if ca.depends_on(matrix, unknown):
-                listed = "; ".join(labels[r] for r, _ in block[:4])
-                what = "equation is not linear in" if len(block) == 1 else "algebraic loop is not linear in"
-                raise ModelicaError(f"{model}: the {what} {', '.join(names[:6])}: {listed}.")
-            if matrix.is_constant() and np.linalg.matrix_rank(np.array(ca.DM(matrix))) < len(block):
-                listed = "; ".join(labels[r] for r, _ in block[:4])
-                raise ModelicaError(
-                    f"{model}: singular: {', '.join(names[:6])} cannot be solved from {listed}."
-                )
-            constant = ca.substitute([residual], [unknown], [ca.SX.zeros(len(block))])[0]
-            solution.update(zip(names, ca.vertsplit(_linear_solve(matrix, constant)), strict=True))
-        return solution
+            constant = ca.substitute([residual], [unknown], [ca.SX.zeros(len(names))])[0]
+            self.solution.update(zip(names, ca.vertsplit(_linear_solve(matrix, constant)), strict=True))
+            return
+        fresh = [ca.SX.sym(f"implicit({n})") for n in names]
+        residual = ca.substitute([residual], [unknown], [ca.vertcat(*fresh)])[0]
+        self.solution.update(zip(names, fresh, strict=True))
+        guess = [self.guesses.get(n, ca.SX(0)) if self.guesses else ca.SX(0) for n in names]
+        self.blocks.append(Block(tuple(names), ca.vertcat(*fresh), residual, ca.vertcat(*guess)))
+
+
+def _torn(
+    residual: ca.SX, names: list[str], symbols: dict[str, ca.SX]
+) -> tuple[list[tuple[str, ca.SX]], ca.SX, list[str]]:
+    """Eliminate unknowns that an equation gives explicitly, with a constant coefficient.
+
+    Returns the eliminated ones in order, each in terms of those that come after it and of the rest; the residual that
+    is left, and the names of the rest.
+    """
+    rows = ca.vertsplit(residual)
+    rest = list(names)
+    eliminated: list[tuple[str, ca.SX]] = []
+    while len(rows) > 1:
+        found = _explicit(rows, rest, symbols)
+        if found is None:
+            break
+        row, name, value = found
+        rows.pop(row)
+        rest.remove(name)
+        rows = ca.substitute(rows, [symbols[name]], [value])
+        eliminated.append((name, value))
+    return eliminated, ca.vertcat(*rows), rest
+
+
+def _explicit(rows: list[ca.SX], names: list[str], symbols: dict[str, ca.SX]) -> tuple[int, str, ca.SX] | None:
+    unknown = {str(symbols[n]): n for n in names}
+    counted = []
+    for index, row in enumerate(rows):
+        present = [unknown[str(s)] for s in ca.symvar(row) if str(s) in unknown]
+        counted.append((len(present), index, present))
+    for _, index, present in sorted(counted):
+        for name in present:
+            slope = ca.jacobian(rows[index], symbols[name])
+            if slope.is_constant() and abs(float(slope)) > 1e-12:
+                rest = ca.substitute([rows[index]], [symbols[name]], [ca.SX(0)])[0]
+                return index, name, -rest / float(slope)
+    return None
 
 
 def _linear_solve(matrix: ca.SX, constant: ca.SX) -> ca.SX:
@@ -193,6 +325,4 @@ def _linear_solve(matrix: ca.SX, constant: ca.SX) -> ca.SX:
         if matrix.is_constant() and float(matrix) in (1.0, -1.0):
             return -constant if float(matrix) == 1.0 else constant
         return -constant / matrix
-    if matrix.shape[0] <= 3:
-        return -ca.mtimes(ca.inv_minor(ca.densify(matrix)), constant)
-    return -ca.solve(matrix, constant)
+    return -ca.mtimes(ca.inv_minor(ca.densify(matrix)), constant)

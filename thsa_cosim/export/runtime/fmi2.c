@@ -6,9 +6,11 @@
  * instance is then back at its last communication point (fmi2LastSuccessfulTime) and waits for fmi2SetFMUstate,
  * fmi2Reset or fmi2Terminate.
  */
+#include <float.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fmi2Functions.h"
+#include "discrete.h"
 #include "instance.h"
 
 typedef struct {
@@ -221,7 +223,13 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo) {
     REQUIRE(EVENT_MODE, MODEL_EXCHANGE);
     REQUIRE_ARRAYS(1, eventInfo, eventInfo);
     memset(eventInfo, 0, sizeof *eventInfo);
-    return (fmi2Status)instance_update_modes(CORE); /* settles the relations: no further update is needed */
+    const Status status = instance_update_modes(CORE); /* settles all at once: no further update is needed */
+    const double next = discrete_next(CORE);
+    eventInfo->valuesOfContinuousStatesChanged = CORE->s.states_jumped;
+    CORE->s.states_jumped = 0;
+    eventInfo->nextEventTimeDefined = next < DBL_MAX;
+    eventInfo->nextEventTime = next < DBL_MAX ? next : 0.0;
+    return (fmi2Status)(status == OK ? discrete_assertions(CORE) : status);
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
@@ -240,7 +248,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStat
     *enterEventMode = fmi2False;
     if (instance_missed_event(CORE, &missed) != OK) return fmi2Discard;
     if (missed) *enterEventMode = fmi2True;
-    return fmi2OK;
+    return (fmi2Status)discrete_assertions(CORE);
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {

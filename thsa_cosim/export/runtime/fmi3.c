@@ -10,9 +10,11 @@
  * Event Mode in Co-Simulation is optional: with eventModeUsed the importer may announce jumps of inputs; the
  * model's own events are handled inside fmi3DoStep in both cases. Scheduled Execution and clocks do not exist.
  */
+#include <float.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fmi3Functions.h"
+#include "discrete.h"
 #include "instance.h"
 
 typedef struct {
@@ -416,7 +418,13 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = fmi3False;
     *valuesOfContinuousStatesChanged = *nextEventTimeDefined = fmi3False;
     *nextEventTime = 0.0;
-    return (fmi3Status)instance_update_modes(CORE); /* settles the relations: no further update is needed */
+    const Status status = instance_update_modes(CORE); /* settles all at once: no further update is needed */
+    const double next = discrete_next(CORE);
+    *valuesOfContinuousStatesChanged = CORE->s.states_jumped;
+    CORE->s.states_jumped = 0;
+    *nextEventTimeDefined = next < DBL_MAX;
+    *nextEventTime = next < DBL_MAX ? next : 0.0;
+    return (fmi3Status)(status == OK ? discrete_assertions(CORE) : status);
 }
 
 /* Model Exchange */

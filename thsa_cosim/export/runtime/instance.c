@@ -8,6 +8,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+#include "discrete.h"
 #include "solver.h"
 
 enum { MOST_ITERATIONS = 50 };
@@ -28,6 +29,18 @@ void instance_log(Instance *c, Status status, Category category, const char *for
         if (*p == '%') *p = '?'; /* some importers use the message as a format */
     while (!((unsigned)category >> bit & 1u)) bit++;
     c->emit(c, status, category_names[bit], text);
+}
+
+void instance_warn(Instance *c, const char *format, ...) {
+    char text[512];
+    va_list arguments;
+    if (!c->emit) return;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    for (char *p = text; *p; p++)
+        if (*p == '%') *p = '?';
+    c->emit(c, WARNING, category_names[0], text);
 }
 
 Status instance_set_logging(Instance *c, int on, size_t n, const char *const categories[]) {
@@ -92,6 +105,7 @@ void instance_reset(Instance *c) {
     c->s.dependent_due = c->s.initial_due = 1;
     c->factors_of = -1;
     c->events = c->steps = c->rejected = 0;
+    memset(c->asserted, 0, sizeof c->asserted);
     instance_changed(c);
 }
 
@@ -130,7 +144,7 @@ static Status update_dependent(Instance *c) {
 }
 
 /* m := (g > 0) where g has left the dead band on the other side; returns the number of relations that changed. */
-static int switch_modes(Instance *c, int report) {
+int instance_switch_modes(Instance *c, int report) {
     Motion *now = &c->s.now;
     int changed = 0;
     for (int k = 0; k < N_G; k++) {
@@ -151,10 +165,14 @@ static int switch_modes(Instance *c, int report) {
 Status instance_update_modes(Instance *c) {
     if (update_dependent(c) != OK) return DISCARD;
     c->s.modes_due = 0;
+#if N_EVENTS
+    c->events++;
+    return discrete_update(c);
+#endif
     if (!N_G) return OK;
     for (int i = 0; i < MOST_ITERATIONS; i++) {
         if (instance_indicators(c) != OK) return DISCARD;
-        if (!switch_modes(c, 1)) return OK;
+        if (!instance_switch_modes(c, 1)) return OK;
         c->events++;
     }
     return fail(c, DISCARD, "the event iteration does not settle");
@@ -173,15 +191,26 @@ Status instance_initialize(Instance *c) {
     if (!s->initial_due) return OK;
     memset(s->now.m, 0, sizeof s->now.m);
     memset(s->now.span, 0, sizeof s->now.span);
+#if N_EVENTS
+    discrete_reset(c);
+#endif
     for (int i = 0; i < MOST_ITERATIONS; i++) {
         instance_changed(c);
         if (model_initial(s->now.time, s->now.u, s->p, s->d, s->now.m, s->x_start, s->now.x) ||
             !all_finite(s->now.x, N_X))
             return not_initialized(c, "the initial equations have no solution");
         if (instance_indicators(c) != OK) return not_initialized(c, "a relation cannot be evaluated");
-        if (!switch_modes(c, 0)) {
+        int changed = instance_switch_modes(c, 0);
+#if N_EVENTS
+        if (discrete_start(c, &changed) != OK) return not_initialized(c, "the discrete variables have no start value");
+#endif
+        if (!changed) {
             s->initial_due = 0;
+#if N_EVENTS
+            return discrete_started(c);
+#else
             return OK;
+#endif
         }
     }
     return not_initialized(c, "the initial equations and relations do not settle");
@@ -390,7 +419,7 @@ Status instance_do_step(Instance *c, double from, double size) {
         s->derivatives_used = 1;
         const Motion before = s->now;
         s->phase = IN_STEP;
-        const Status status = solver_advance(c, end);
+        Status status = discrete_advance(c, end);
         s->phase = STEP_MODE;
         if (status != OK) {
             s->now = before;
@@ -399,5 +428,5 @@ Status instance_do_step(Instance *c, double from, double size) {
         }
     }
     s->last_step_end = s->now.time;
-    return OK;
+    return discrete_assertions(c);
 }

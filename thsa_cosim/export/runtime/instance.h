@@ -30,7 +30,8 @@ typedef struct {
     double time;
     double step;             /* step size the controller remembers; 0 = none yet */
     double last_error;       /* scaled error of the last accepted step (PI control) */
-    double x[N_X + 1], u[N_U + 1], m[N_G + 1];
+    double x[N_X + 1], u[N_U + 1], m[N_M + 1];
+    double next[N_T + 1];    /* time of the next tick of each sample */
     double span[N_G + 1];    /* largest |g| seen: scale of the dead band that rounding noise cannot leave */
 } Motion;
 
@@ -46,6 +47,7 @@ typedef struct {
     int derivatives_used;    /* du belong to the step just done; the next one starts with du = 0 */
     int dependent_due;       /* p changed: d is out of date */
     int initial_due;         /* initial equations not solved for the present start values */
+    int states_jumped;       /* an event has reinitialized states since this was last asked (Model Exchange) */
     int modes_due;           /* inputs or parameters jumped: relations have to be checked (Co-Simulation) */
 } State;
 
@@ -76,6 +78,7 @@ struct Instance {
     double stage[RODAS_STAGES][N_X + 1];
     double x_new[N_X + 1];
     long events, steps, rejected;
+    unsigned char asserted[N_A + 1]; /* violations are reported once */
 };
 
 extern const char *const category_names[6]; /* in the order of the bits of Category */
@@ -83,6 +86,12 @@ extern const char *const category_names[6]; /* in the order of the bits of Categ
 void instance_log(Instance *c, Status status, Category category, const char *format, ...)
 #if defined(__GNUC__) || defined(__clang__)
     __attribute__((format(printf, 4, 5)))
+#endif
+    ;
+
+void instance_warn(Instance *c, const char *format, ...) /* a warning that is shown whatever is logged */
+#if defined(__GNUC__) || defined(__clang__)
+    __attribute__((format(printf, 2, 3)))
 #endif
     ;
 
@@ -95,6 +104,7 @@ void instance_changed(Instance *c);     /* the point changed: caches are void */
 Status instance_setup(Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined, double stop);
 Status instance_initialize(Instance *c);         /* solve the initial equations if they are due */
 Status instance_update_modes(Instance *c);       /* event iteration at the present point */
+int instance_switch_modes(Instance *c, int report); /* relations that have changed; their number */
 Status instance_settle(Instance *c);             /* bring d, x, m up to date as the phase demands */
 Status instance_derivatives(Instance *c);        /* fills c->dx */
 Status instance_indicators(Instance *c);         /* fills c->g */

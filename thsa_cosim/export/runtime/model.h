@@ -14,6 +14,18 @@
 #define N_CACHE 0 /* doubles behind d[N_D] in which the model keeps what only slow inputs change */
 #endif
 
+/* What few models have; N_EVENTS = discrete variables, time events or initial() are used. */
+#ifndef N_EVENTS
+#define N_EVENTS 0
+#define N_Z 0 /* discrete variables */
+#define N_L 0 /* of these the left limits of continuous ones */
+#define N_T 0 /* samples */
+#define N_R 0 /* 1: states are reinitialized */
+#define N_A 0 /* assertions */
+#define N_IMPLICIT 0 /* unknowns of implicit equations, kept at the end of the cache */
+#endif
+#define N_M (N_G + (N_EVENTS ? 2 * N_Z + N_T + 1 : 0)) /* modes, z, pre(z), ticks, initial */
+
 #if N_X < 0 || N_U < 0 || N_P < 0 || N_D < 0 || N_W < 0 || N_Y > N_W || N_G < 0
 #error "model_config.h: inconsistent sizes"
 #endif
@@ -33,5 +45,12 @@ int model_indicators(MODEL_POINT, double *g);  /* N_G */
 int model_jacobian(MODEL_POINT, double *A, double *B, double *ft);  /* df/dx, df/du, partial df/dt */
 int model_directional(MODEL_POINT, const double *sx, const double *su, const double *sp,
                       double *ddx, double *dw);  /* exact directional derivatives of dx and w */
+
+int model_discrete(MODEL_POINT, double *z);         /* new values of the discrete variables */
+int model_discrete_start(MODEL_POINT, const double *x_start, double *z); /* their values before the first event */
+int model_reinit(MODEL_POINT, double *x_new);         /* states after an event */
+int model_samples(const double *p, const double *d, double *s); /* start and interval of each sample */
+int model_assertions(MODEL_POINT, double *a);       /* nonzero where violated */
+extern const char *const model_assertion_text[];
 
 #endif

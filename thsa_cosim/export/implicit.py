@@ -1,0 +1,217 @@
+"""The C code of implicit equations: residuals, Jacobians, and the total derivatives through them.
+
+The unknowns y of all blocks live at the end of the cache, so that the next solution starts from the last one. With
+R(y, v) = 0 the derivative of a function f(y, v) is f_v + f_y S, S = -R_y^-1 R_v, whose numbers are found at run time.
+"""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from thsa_cosim.export.causal import CausalModel, column
+from thsa_cosim.export.emit import statements
+from thsa_cosim.export.graph import Graph
+from thsa_cosim.export.solve import Block
+
+_POINT = "double t, const double *x, const double *u, const double *p, const double *d, const double *m"
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Symbols of dy/dx, dy/du, dy/dt and of dy along a direction."""
+
+    x: ca.SX
+    u: ca.SX
+    t: ca.SX
+    along: ca.SX
+
+
+class Implicit:
+    """What the blocks of one model add to its C code."""
+
+    def __init__(self, model: CausalModel, seeds: tuple[ca.SX, ca.SX, ca.SX], dependent_rate: ca.SX) -> None:
+        self.model = model
+        self.size = model.y.numel()
+        n_x, n_u = model.x.numel(), model.u.numel()
+        self.rates = Rates(
+            ca.SX.sym("yx", self.size, n_x), ca.SX.sym("yu", self.size, n_u), ca.SX.sym("yt", self.size, 1),
+            ca.SX.sym("ys", self.size, 1),
+        )  # fmt: skip
+        self.columns = n_x + n_u + 1
+        self._seeds = seeds
+        self._dependent_rate = dependent_rate
+        self.symbols = {model.y.nz[i].name(): f"y[{i}]" for i in range(self.size)}
+        for symbol, first in ((self.rates.x, 0), (self.rates.u, n_x), (self.rates.t, n_x + n_u)):
+            for i in range(symbol.numel()):
+                self.symbols[symbol.nz[i].name()] = f"S[{first * self.size + i}]"
+        for i in range(self.size):
+            self.symbols[self.rates.along.nz[i].name()] = f"S[{i}]"
+        self.initial: list[Block] = []
+        offset = 0
+        for block in model.initial_blocks:
+            for i in range(block.unknown.numel()):
+                self.symbols[block.unknown.nz[i].name()] = f"y0[{offset + i}]"
+            offset += block.unknown.numel()
+        self.initial_size = offset
+
+    def total(self, function: ca.SX, over: ca.SX, rates: ca.SX) -> ca.SX:
+        """Jacobian of a function with y following."""
+        partial = ca.jacobian(function, over)
+        if not self.size or not over.numel():
+            return partial
+        return partial + ca.mtimes(ca.jacobian(function, self.model.y), rates)
+
+    def along(self, function: ca.SX, partial: ca.SX) -> ca.SX:
+        """Directional derivative of a function with y following."""
+        return partial + ca.jtimes(function, self.model.y, self.rates.along) if self.size else partial
+
+    def begin(self, name: str) -> list[str]:
+        """The first statements of a function: bring y, and its derivatives, up to date."""
+        if name in ("dependent", "samples"):
+            return []
+        if name in ("initial", "discrete_start"):
+            lines = []
+            if self.initial_size:
+                lines = [
+                    f"  double y0[{self.initial_size}];",
+                    "  if (solve_initial(t, u, p, d, m, x_start, y0)) return 1;",
+                ]
+            if self.size:
+                lines.append("  double *y = implicit_of(d);")
+                if name == "discrete_start":
+                    lines.append("  if (solve(t, x, u, p, d, m)) return 1;")
+            return [*lines, "  (void)y;"] if self.size else lines
+        if not self.size:
+            return []
+        lines = ["  double *y = implicit_of(d);", "  (void)y;", "  if (solve(t, x, u, p, d, m)) return 1;"]
+        if name == "jacobian":
+            lines += [
+                f"  double S[{self.size * self.columns}];",
+                "  if (rates(t, x, u, p, d, m, S)) return 1;",
+            ]
+        elif name == "directional":
+            lines += [
+                f"  double S[{self.size}];",
+                "  if (rates_along(t, x, u, p, d, m, sx, su, sp, S)) return 1;",
+            ]
+        return lines
+
+    def source(
+        self, graph: Graph, symbols: dict[str, str], cached: dict[int, str], own: int, refresh: bool
+    ) -> list[str]:
+        """Functions that the others call."""
+        if not self.size and not self.initial_size:
+            return []
+        lines = ['#include "newton.h"', ""]
+        if self.size:
+            lines += [
+                "static double *implicit_of(const double *d) { return (double *)d + N_D + %d; }" % own,
+                "",
+            ]
+        lines += self._solve(graph, symbols)
+        lines += self._solve_initial(graph, symbols)
+        if self.size:
+            lines += self._rates(graph, symbols)
+        return lines
+
+    def _residual(self, graph: Graph, symbols: dict[str, str], name: str, block: Block, y: str, extra: str) -> list[str]:
+        """``static int name(const Point *at, double *f, double *jacobian)``."""
+        f = [(f"f[{i}]", node) for i, node in enumerate(graph.add_column(block.residual))]
+        matrix = ca.jacobian(block.residual, block.unknown)
+        jac = [(f"jacobian[{i}]", node) for i, node in enumerate(graph.add_column(matrix))]
+        lines = [
+            f"static int {name}(const Point *at, double *f, double *jacobian) {{",
+            "  const double t = at->t, *x = at->x, *u = at->u, *p = at->p, *d = at->d, *m = at->m;",
+            f"  const double *{y} = at->y;",
+            f"  (void)t; (void)x; (void)u; (void)p; (void)d; (void)m; (void){y};",
+        ]
+        if extra:
+            lines += [f"  const double *{extra} = at->x;", f"  (void){extra};"]
+        lines += ["  {", *statements(graph, f, symbols, {}), "  }", "  if (jacobian) {"]
+        lines += statements(graph, jac, symbols, {})
+        return [*lines, "  }", "  return 0;", "}", ""]
+
+    def _calls(self, blocks: tuple[Block, ...], prefix: str, y: str) -> list[str]:
+        largest = max(b.unknown.numel() for b in blocks)
+        lines = [f"  double work[{largest * (largest + 4)}];", f"  int pivot[{largest}];"]
+        offset = 0
+        for k, block in enumerate(blocks):
+            n = block.unknown.numel()
+            lines.append(f"  if (newton_solve({n}, {y} + {offset}, {prefix}{k}, &at, work, pivot)) return 1;")
+            offset += n
+        return lines
+
+    def _solve(self, graph: Graph, symbols: dict[str, str]) -> list[str]:
+        if not self.size:
+            return []
+        lines = []
+        for k, block in enumerate(self.model.blocks):
+            lines += self._residual(graph, symbols, f"block_{k}", block, "y", "")
+        lines += [
+            f"static int solve({_POINT}) {{",
+            "  double *y = implicit_of(d);",
+            "  const Point at = {t, x, u, p, d, m, y};",
+            *self._calls(self.model.blocks, "block_", "y"),
+            "  return 0;",
+            "}",
+            "",
+        ]
+        return lines
+
+    def _solve_initial(self, graph: Graph, symbols: dict[str, str]) -> list[str]:
+        if not self.initial_size:
+            return []
+        lines = []
+        for k, block in enumerate(self.model.initial_blocks):
+            lines += self._residual(graph, symbols, f"initial_block_{k}", block, "y0", "x_start")
+        guesses = column(
+            b.guess.nz[i]
+            for b in (_dense(b) for b in self.model.initial_blocks)
+            for i in range(b.unknown.numel())
+        )
+        first = [(f"y0[{i}]", node) for i, node in enumerate(graph.add_column(guesses))]
+        lines += [
+            "static int solve_initial(double t, const double *u, const double *p, const double *d, const double *m,",
+            "                         const double *x_start, double *y0) {",
+            "  const Point at = {t, x_start, u, p, d, m, y0};",
+            "  (void)u; (void)p; (void)d; (void)m;",
+            *statements(graph, first, symbols, {}),
+            *self._calls(self.model.initial_blocks, "initial_block_", "y0"),
+            "  return 0;",
+            "}",
+            "",
+        ]
+        return lines
+
+    def _rates(self, graph: Graph, symbols: dict[str, str]) -> list[str]:
+        model, n = self.model, self.size
+        residual = ca.vertcat(*[b.residual for b in model.blocks])
+        matrix = ca.jacobian(residual, model.y)
+        over = ca.vertcat(model.x, model.u, model.time)
+        wide = -ca.jacobian(residual, over)
+        known = ca.vertcat(model.x, model.u, model.p, model.d)
+        directed = -ca.jtimes(residual, known, ca.vertcat(*self._seeds, self._dependent_rate))
+        made = []
+        seeds = ", const double *sx, const double *su, const double *sp"
+        for name, right, columns, arguments in (
+            ("rates", wide, self.columns, ""),
+            ("rates_along", directed, 1, seeds),
+        ):
+            outputs = [(f"R[{i}]", node) for i, node in enumerate(graph.add_column(matrix))]
+            outputs += [(f"S[{i}]", node) for i, node in enumerate(graph.add_column(right))]
+            made += [
+                f"static int {name}({_POINT}{arguments}, double *S) {{",
+                f"  double *y = implicit_of(d), R[{n * n}];",
+                f"  int pivot[{n}];",
+                "  (void)t; (void)x; (void)u; (void)p; (void)d; (void)m; (void)y;",
+                *(["  (void)sx; (void)su; (void)sp;"] if arguments else []),
+                *statements(graph, outputs, symbols, {}),
+                f"  return newton_linear({n}, {columns}, R, S, pivot);",
+                "}",
+                "",
+            ]
+        return made
+
+
+def _dense(block: Block) -> Block:
+    return Block(block.names, block.unknown, block.residual, ca.densify(block.guess))

@@ -1,0 +1,422 @@
+"""Expressions in a scope → values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+from thsa_cosim.errors import ModelicaError, did_you_mean
+from thsa_cosim.modelica import builtin
+from thsa_cosim.modelica.arrays import Record, Value, binary, concatenate, each, elements, fill, promote, shape
+from thsa_cosim.modelica.modifier import Binding
+from thsa_cosim.modelica.scope import DISABLED, Scope, Variable
+from thsa_cosim.modelica.syntax import Syntax
+from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, constant, make, plain, substitute, text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+TIME = Term("ref", ("time",))
+_RELATIONS = frozenset(("<", "<=", ">", ">=", "==", "<>"))
+
+
+class Evaluator:
+    """Evaluates expressions in a scope; ``local`` holds loop variables and the variables of a function."""
+
+    def __init__(self, scope: Scope, local: Mapping[str, Value] | None = None, in_function: bool = False) -> None:
+        self.scope = scope
+        self.local: dict[str, Value] = dict(local or {})
+        self.in_function = in_function
+        self.ends: list[int] = []
+
+    def with_local(self, local: Mapping[str, Value]) -> Evaluator:
+        """The same scope with further loop variables."""
+        return Evaluator(self.scope, {**self.local, **local}, self.in_function)
+
+    def error(self, expression: Syntax, what: str) -> ModelicaError:
+        return ModelicaError(f"{self.scope.place(expression.line)}: {what}")
+
+    def value(self, expression: Syntax) -> Value:
+        """Value of an expression; raises ModelicaError, with file and line, for what is not supported."""
+        try:
+            return getattr(self, f"_{expression.op}")(expression)
+        except ModelicaError as error:
+            if str(error).startswith(("/", self.scope.definition.file.anchor)) or ".mo:" in str(error):
+                raise
+            raise self.error(expression, f"{error}.") from error
+        except RecursionError as error:
+            raise self.error(expression, "this expression depends on itself.") from error
+
+    def structural(self, expression: Syntax, what: str) -> Any:
+        """Value of an expression that has to be known at export; its parameters are then fixed there."""
+        return self.fixed(self.value(expression), expression, what)
+
+    def fixed(self, value: Value, expression: Syntax, what: str) -> Any:
+        """A value as constants."""
+        if isinstance(value, list):
+            return [self.fixed(v, expression, what) for v in value]
+        if not isinstance(value, Term):
+            return value
+        done: dict[int, Scalar] = {}
+        result = substitute(value, lambda term: self._parameter(term, expression, what), done)
+        if isinstance(result, Term):
+            raise self.error(expression, f"{what} has to be known at export, but is {text(result)}.")
+        return result
+
+    def _parameter(self, term: Term, expression: Syntax, what: str) -> Scalar | None:
+        if term.op != "ref":
+            return None
+        name = term.args[0]
+        variable = self.scope.world.variables.get(name)
+        if variable is None or variable.variability not in ("parameter", "constant"):
+            raise self.error(expression, f"{what} has to be known at export, but depends on {name}.")
+        self.scope.world.structural.add(name)
+        binding = variable.binding or variable.attributes.get("start")
+        return self.fixed(bound(binding), expression, what) if binding else 0.0
+
+    # -- leaves
+
+    def _number(self, expression: Syntax) -> Value:
+        return expression.args[0]
+
+    _string = _boolean = _number
+
+    def _end(self, expression: Syntax) -> Value:
+        if not self.ends:
+            raise self.error(expression, "'end' stands outside of a subscript.")
+        return self.ends[-1]
+
+    def _colon(self, expression: Syntax) -> Value:
+        raise self.error(expression, "':' stands outside of a subscript.")
+
+    def _function(self, expression: Syntax) -> Value:
+        raise self.error(expression, "a function as an argument is a limit of this exporter.")
+
+    # -- operators
+
+    def _unary(self, expression: Syntax) -> Value:
+        operator, operand = expression.args
+        op = {"-": "neg", "not": "not"}[operator]
+        return each(lambda x: make(op, x), self.value(operand))
+
+    def _binary(self, expression: Syntax) -> Value:
+        op, left, right = expression.args
+        if op == "and" and (first := self.value(left)) is False:
+            return False
+        if op == "or" and (first := self.value(left)) is True:
+            return True
+        a, b = (first if op in ("and", "or") else self.value(left)), self.value(right)
+        if isinstance(a, Record) or isinstance(b, Record):
+            return builtin.record_operator(self, op, a, b, expression)
+        result = binary(op, a, b)
+        if self.in_function and op in _RELATIONS:
+            result = each(lambda x: make("noEvent", x) if isinstance(x, Term) else x, result)
+        return result
+
+    def _if(self, expression: Syntax) -> Value:
+        branches, otherwise = expression.args
+        conditions: list[tuple[Scalar, Value]] = []
+        for condition, branch in branches:
+            chosen = self.value(condition)
+            if chosen is False:
+                continue
+            if chosen is True:
+                result = self.value(branch)
+                break
+            conditions.append((chosen, self.value(branch)))
+        else:
+            result = self.value(otherwise)
+        for condition, branch_value in reversed(conditions):
+            result = self.select(condition, branch_value, result, expression)
+        return result
+
+    def select(self, condition: Scalar, yes: Value, no: Value, expression: Syntax) -> Value:
+        """``if condition then yes else no`` for values of one shape."""
+        if shape(yes) != shape(no):
+            chosen = self.fixed(condition, expression, "the condition of branches of different sizes")
+            return yes if chosen else no
+        return each(lambda a, b: make("if", condition, a, b), yes, no)
+
+    # -- arrays
+
+    def _array(self, expression: Syntax) -> Value:
+        return [self.value(item) for item in expression.args]
+
+    def _tuple(self, expression: Syntax) -> Value:
+        return tuple(self.value(item) for item in expression.args)
+
+    def _matrix(self, expression: Syntax) -> Value:
+        rows = []
+        for row in expression.args:
+            parts = [self.value(item) for item in row]
+            rank = max(2, max(len(shape(part)) for part in parts))
+            rows.append(concatenate(2, [promote(part, rank) for part in parts]))
+        return concatenate(1, rows)
+
+    def _range(self, expression: Syntax) -> Value:
+        first, step, last = expression.args
+        a = self.structural(first, "the start of a range")
+        b = self.structural(last, "the end of a range")
+        d = self.structural(step, "the step of a range") if step else 1
+        if isinstance(a, Enumeration):
+            scope = self.scope.find_class(a.type)
+            names = scope.definition.literals if scope and scope.definition.literals else ()
+            return [Enumeration(a.type, names[k - 1], k) for k in range(a.index, plain(b) + 1)]
+        if all(isinstance(v, int) for v in (a, b, d)):
+            return list(range(a, b + (1 if d > 0 else -1), d))
+        count = int((b - a) / d + 1e-9) + 1
+        return [a + k * d for k in range(count)]
+
+    def _comprehension(self, expression: Syntax) -> Value:
+        item, iterators = expression.args
+        return self._comprehended(item, list(iterators))
+
+    def _comprehended(self, item: Syntax, iterators: list[Any]) -> Value:
+        if not iterators:
+            return self.value(item)
+        # the last iterator varies outermost (Modelica Language Specification 3.6, 10.4.1)
+        (name, values), rest = iterators[-1], iterators[:-1]
+        listed = self.iterated(name, values, item)
+        return [self.with_local({name: v})._comprehended(item, rest) for v in listed]
+
+    def iterated(self, name: str, values: Syntax | None, where: Syntax) -> list[Value]:
+        """What a loop variable runs through."""
+        if values is None:
+            raise self.error(where, f"the loop over {name} has no range, which is a limit of this exporter.")
+        if values.op == "name":
+            found = self.scope.find_class(".".join(p for p, _ in values.args))
+            if found is not None and found.definition.literals:
+                return [Enumeration(found.qualified, n, i + 1) for i, n in enumerate(found.definition.literals)]
+        result = self.value(values)
+        if not isinstance(result, list):
+            raise self.error(values, f"the loop over {name} needs a vector.")
+        return result
+
+    # -- names
+
+    def _member(self, expression: Syntax) -> Value:
+        """A field of a record value (made by the elaboration of records, not by the grammar)."""
+        record, field = expression.args
+        return self.field(self.value(record), field, expression)
+
+    def field(self, value: Value, name: str, where: Syntax) -> Value:
+        """A field of a record, or of every record of an array."""
+        if isinstance(value, list):
+            return [self.field(v, name, where) for v in value]
+        if not isinstance(value, Record) or name not in value.fields:
+            raise self.error(where, f"there is no field {name}.")
+        return value.fields[name]
+
+    def _name(self, expression: Syntax) -> Value:
+        parts = expression.args
+        first, subscripts = parts[0]
+        if first in self.local:
+            value = self.subscripted(self.local[first], subscripts, expression)
+            for name, further in parts[1:]:
+                value = self.subscripted(self.field(value, name, expression), further, expression)
+            return value
+        if first == "time" and len(parts) == 1:
+            return TIME
+        return self.of_node(self.node(expression), expression)
+
+    def node(self, expression: Syntax) -> Any:
+        """The component (or enumeration literal, or list of components) that a name stands for."""
+        parts = list(expression.args)
+        if parts[0][0] == "":
+            found: Any = self.scope.world.top(parts[1][0])
+            rest = parts[2:]
+        else:
+            found = self._first(parts[0][0])
+            rest = parts[1:]
+            if found is not None and not (isinstance(found, Scope) and found.path is None):
+                found = self.subscripted(found, parts[0][1], expression)
+        if found is None:
+            raise self._unknown(expression, parts[0][0] or parts[1][0])
+        for name, subscripts in rest:
+            found = self.subscripted(self.member(found, name, expression), subscripts, expression)
+        return found
+
+    def _first(self, name: str) -> Any:
+        scope: Scope | None = self.scope
+        while scope is not None:
+            if scope.declares(name):
+                return scope.component(name)
+            found = scope.member_class(name) or scope.imported(name) or self._imported_component(scope, name)
+            if found is not None:
+                return found
+            if "encapsulated" in scope.definition.prefixes:
+                break
+            scope = scope.parent
+        return self.scope.world.top(name)
+
+    def _imported_component(self, scope: Scope, name: str) -> Any:
+        from thsa_cosim.modelica.syntax import Import
+
+        for element in scope.definition.elements:
+            if isinstance(element, Import):
+                packages = list(element.wildcards)
+                wanted = name
+                if name in element.names and "." in element.names[name]:
+                    package, wanted = element.names[name].rsplit(".", 1)
+                    packages = [package]
+                for package in packages:
+                    found = scope._absolute(package)
+                    if found is not None and found.declares(wanted):
+                        return found.component(wanted)
+        return None
+
+    def member(self, node: Any, name: str, where: Syntax) -> Any:
+        """A component of a component, a class of a class, a literal of an enumeration."""
+        if isinstance(node, list):
+            return [self.member(part, name, where) for part in node]
+        if isinstance(node, Record):
+            return self.field(node, name, where)
+        if node is DISABLED:
+            raise self.error(where, f"{_written(where)} belongs to a component whose condition is false.")
+        if isinstance(node, Scope):
+            if node.declares(name):
+                return node.component(name)
+            if node.definition.literals and name in node.definition.literals:
+                return Enumeration(node.qualified, name, node.definition.literals.index(name) + 1)
+            found = node.member_class(name)
+            if found is None:
+                for base in node.bases:  # a type that is derived from an enumeration
+                    if base.definition.literals or base.bases:
+                        return self.member(base, name, where)
+            if found is not None:
+                return found
+        names = list(node.elements) if isinstance(node, Scope) else []
+        raise self.error(where, f"{_written(where)}: there is no {name}.{did_you_mean(name, names)}")
+
+    def _unknown(self, expression: Syntax, name: str) -> ModelicaError:
+        known = [*self.scope.elements, *self.local]
+        return self.error(expression, f"the name {_written(expression)} is not known.{did_you_mean(name, known)}")
+
+    def of_node(self, node: Any, where: Syntax) -> Value:
+        """Value of a component."""
+        if isinstance(node, Variable):
+            return variable_value(node)
+        if isinstance(node, list):
+            return [self.of_node(part, where) for part in node]
+        if node is DISABLED:
+            raise self.error(where, f"{_written(where)} belongs to a component whose condition is false.")
+        if isinstance(node, Scope):
+            if node.path is None:
+                if node.definition.literals:
+                    return [Enumeration(node.qualified, n, i + 1) for i, n in enumerate(node.definition.literals)]
+                raise self.error(where, f"{_written(where)} is a class, not a value.")
+            names = [n for n in node.elements if node.declares(n)]
+            fields = {n: node.component(n) for n in names}
+            return Record(
+                node.qualified, {n: self.of_node(f, where) for n, f in fields.items() if f is not DISABLED}
+            )
+        return node
+
+    def subscripted(self, value: Any, subscripts: Sequence[Syntax], where: Syntax) -> Any:
+        """An element or a slice of an array."""
+        if not subscripts:
+            return value
+        first, rest = subscripts[0], subscripts[1:]
+        if not isinstance(value, list):
+            raise self.error(where, f"{_written(where)} has more subscripts than dimensions.")
+        if first.op == "colon":
+            return [self.subscripted(v, rest, where) for v in value]
+        self.ends.append(len(value))
+        try:
+            index = self.value(first)
+        finally:
+            self.ends.pop()
+        if isinstance(index, list):
+            if index and all(isinstance(i, bool) for i in index):
+                index = [k + 1 for k, chosen in enumerate(index) if chosen]
+            return [self.subscripted(self._element(value, i, where), rest, where) for i in index]
+        return self.subscripted(self._element(value, index, where), rest, where)
+
+    def _element(self, value: list[Any], index: Scalar, where: Syntax) -> Any:
+        if isinstance(index, bool):
+            index = int(index) + 1
+        index = plain(index)
+        if isinstance(index, Term):
+            return self._variable_index(value, index, where)
+        if isinstance(index, float) and index == int(index):
+            index = int(index)
+        if not isinstance(index, int) or not 1 <= index <= len(value):
+            raise self.error(where, f"the subscript {text(index)} of {_written(where)} is not in 1:{len(value)}.")
+        return value[index - 1]
+
+    def _variable_index(self, value: list[Any], index: Term, where: Syntax) -> Value:
+        values = [self.of_node(v, where) for v in value]
+        if not values:
+            raise self.error(where, f"{_written(where)} is empty.")
+        result = values[-1]
+        for k in range(len(values) - 1, 0, -1):
+            chosen = make("noEvent", make("<=", index, k))
+            result = each(lambda a, b, c=chosen: make("if", c, a, b), values[k - 1], result)
+        return result
+
+    # -- calls
+
+    def _call(self, expression: Syntax) -> Value:
+        return builtin.call(self, expression)
+
+
+def _written(expression: Syntax) -> str:
+    if expression.op == "name":
+        return ".".join(part + ("[…]" if subscripts else "") for part, subscripts in expression.args)
+    return "the expression"
+
+
+def bound(binding: Binding) -> Value:
+    """Value of a binding, for its element of an array."""
+    cache = binding.scope.world.__dict__.setdefault("bound", {})
+    key = (id(binding.value), id(binding.scope))
+    if key not in cache:
+        cache[key] = (Evaluator(binding.scope).value(binding.value), binding)
+    value = cache[key][0]
+    for index in binding.indices:
+        if not isinstance(value, list):
+            break  # one value for all elements, as if it said each
+        if not 1 <= index <= len(value):
+            raise ModelicaError(
+                f"{binding.scope.place(binding.value.line)}: {len(value)} values are given for an array with more "
+                "elements."
+            )
+        value = value[index - 1]
+    return value
+
+
+def variable_value(variable: Variable) -> Scalar:
+    """Value of a variable: a reference, or what is known at export."""
+    if variable.variability not in ("constant", "parameter") or (
+        variable.variability == "parameter" and variable.type == "Real"
+    ):
+        return Term("ref", (variable.name,))
+    if variable.state == 0:
+        variable.state = 1
+        variable.value = _known(variable)
+        variable.state = 2
+    elif variable.state == 1:
+        raise ModelicaError(f"{variable.place}: the value of {variable.name} depends on itself.")
+    return variable.value
+
+
+def _known(variable: Variable) -> Scalar:
+    binding = variable.binding or variable.attributes.get("start")
+    if binding is None:
+        if variable.variability == "constant" and variable.scope.path is None:
+            raise ModelicaError(f"{variable.place}: the constant {variable.name} has no value.")
+        if variable.type == "enumeration":
+            return Enumeration(variable.scope.qualified, variable.enumeration[0], 1)
+        return {"Boolean": False, "Integer": 0, "String": ""}.get(variable.type, 0.0)
+    value = bound(binding)
+    if isinstance(value, (list, Record)):
+        raise ModelicaError(f"{variable.place}: {variable.name} is a scalar, but gets an array.")
+    if variable.variability == "constant" and isinstance(value, Term):
+        value = Evaluator(binding.scope).fixed(value, binding.value, f"the constant {variable.name}")
+    if variable.type == "Real" and constant(value) and not isinstance(value, str):
+        value = float(plain(value))
+    return value
+
+
+__all__ = ["Evaluator", "bound", "elements", "fill", "product", "variable_value"]

@@ -1,5 +1,6 @@
 """The command ``export``: a Modelica class as an FMU."""
 
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -25,7 +26,9 @@ from thsa_cosim.shipped import modelica_package
     help="A Modelica library: a package's folder, a folder of packages or a .mo file; may be repeated. Those of the "
     "environment variable MODELICAPATH follow.",
 )
-@click.option("--list", "listing", is_flag=True, help="List the models of the libraries (or of the package) instead.")
+@click.option(
+    "--list", "listing", is_flag=True, help="List the models of the libraries (or of the package) instead."
+)
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", show_default=True, help="FMI version.")
 @click.option("-o", "--output", type=PATH, default=None, help="The FMU to write; default MODEL.fmu.")
 @click.option(
@@ -53,17 +56,23 @@ def export(
         _list(list_models(library) for library in libraries or (package or modelica_package(),))
         return
     if model is None:
-        raise click.UsageError("MODEL is missing: a class name, or a .mo file; --list lists the models of a library.")
+        raise click.UsageError(
+            "MODEL is missing: a class name, or a .mo file; --list lists the models of a library."
+        )
     chosen = None if platforms is None else [part.strip() for part in platforms.split(",") if part.strip()]
-    path = export_fmu(
-        model,
-        package=package,
-        fmi=int(fmi),
-        output=output,
-        compiler=compiler,
-        platforms=chosen,
-        libraries=libraries,
-    )
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        path = export_fmu(
+            model,
+            package=package,
+            fmi=int(fmi),
+            output=output,
+            compiler=compiler,
+            platforms=chosen,
+            libraries=libraries,
+        )
+    for warning in said:
+        click.echo(f"note: {warning.message}", err=True)
     click.echo(str(path))
 
 

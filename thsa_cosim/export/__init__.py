@@ -1,7 +1,8 @@
 """Modelica class → FMU: flatten, order the equations, generate C, compile, pack.
 
 ``flatten`` (by ``thsa_cosim.modelica``) → ``causal`` (with ``discrete``, ``expression``, ``structure``, ``solve``) →
-``codegen`` (with ``implicit``) and ``description`` → ``compile`` → ``archive``; the C that is the same for every model is in ``runtime/``.
+``codegen`` (with ``implicit``) and ``description`` → ``compile`` → ``archive``; the C that is the same for every
+model is in ``runtime/``.
 """
 
 import dataclasses

@@ -83,6 +83,7 @@ class CausalModel:
     blocks: tuple[Block, ...] = ()
     initial_blocks: tuple[Block, ...] = ()
     y_start: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    g_start: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # g at the guesses, where the initial values need modes
     assertions: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
 
     @property
@@ -115,7 +116,7 @@ class _Builder:
         self.discretes: list[FlatVariable] = []
         self.split = split_discrete(flat)
         self.symbols: dict[str, ca.SX] = {"time": self.time}
-        self.translator = Translator(self.symbols, self._derivative, frozenset(), dict())
+        self.translator = Translator(self.symbols, self._derivative, frozenset(), {})
         self.memory = self.translator.memory
         self._determined: dict[str, bool] = {}
         for variable in flat.variables.values():
@@ -125,7 +126,9 @@ class _Builder:
 
     def _sort(self, variable: FlatVariable) -> None:
         name, symbols = variable.name, self.symbols
-        if variable.variability == "constant" or (variable.structural and variable.variability == "parameter"):
+        if variable.variability == "constant" or (
+            variable.structural and variable.variability == "parameter"
+        ):
             symbols[name] = ca.SX(self._value(name))
         elif variable.variability == "parameter" and variable.type != "Real":
             if isinstance(variable.binding, Term) and self._depends(variable.binding):
@@ -252,6 +255,7 @@ class _Builder:
         shown = {name: final(expression) for name, expression in shown.items()}
         table = _Table(self, states, solution, initial.settable, shown)
         variables, algebraic, outputs = table.build()
+        indicators = final(column(translate.indicators))
         return CausalModel(
             flat=self.flat,
             states=tuple(states),
@@ -266,7 +270,8 @@ class _Builder:
             rhs=column([solution[system.derivative_name(s)] for s in states]),
             w=algebraic,
             outputs=outputs,
-            g=final(column(translate.indicators)),
+            g=indicators,
+            g_start=self._first_indicators(indicators, x, initial),
             dependent=dependent,
             initial=initial.x,
             events=self._events(final, x, states, reinits, initial),
@@ -314,9 +319,11 @@ class _Builder:
         memory = self.memory
         for variable in self.discretes:
             if variable.name not in self.split.inline:
-                memory.updates[variable.name] = self._at(variable.place, self.split.definitions[variable.name])
+                memory.updates[variable.name] = self._at(
+                    variable.place, self.split.definitions[variable.name]
+                )
         for variable in self.free:
-            memory.updates[variable.name] = memory.values[variable.name]
+            memory.updates[variable.name] = memory.before[variable.name]
 
     def _finish_updates(self) -> None:
         """Left limits of continuous variables come first."""
@@ -344,8 +351,8 @@ class _Builder:
         for reinit, condition, value in reversed(reinits):
             if reinit.state not in states:
                 raise ModelicaError(
-                    f"{reinit.place}: reinit({reinit.state}, …): {reinit.state} is no state of the exported model; give "
-                    "it stateSelect=StateSelect.always."
+                    f"{reinit.place}: reinit({reinit.state}, …): {reinit.state} is no state of the exported model; "
+                    "give it stateSelect=StateSelect.always."
                 )
             k = states.index(reinit.state)
             fresh[k] = ca.if_else(condition, value, fresh[k])
@@ -360,6 +367,16 @@ class _Builder:
             samples=ca.vertcat(*samples) if samples else ca.SX(0, 2),
             used=self._eventful,
         )
+
+    def _first_indicators(self, indicators: ca.SX, x: ca.SX, initial: "_Initial") -> ca.SX:
+        """Event indicators at the start values, from which the search for the initial values sets out."""
+        modes = {str(mode) for mode in self.translator.modes}
+        if not initial.blocks and not {str(s) for s in ca.symvar(initial.x)} & modes:
+            return ca.SX(0, 1)
+        unknown = [b.unknown.nz[i] for b in self.system.blocks for i in range(b.unknown.numel())]
+        guesses = [initial.guesses[n] for b in self.system.blocks for n in b.names]
+        moved = ca.substitute([indicators], [x, column(unknown)], [initial.x_start, column(guesses)])[0]
+        return moved
 
     def _z_start(self, name: str) -> ca.SX:
         if name in self.split.starts:
@@ -403,7 +420,7 @@ class _Builder:
     def _initial(self, states: list[str], equations: list[tuple[ca.SX, str]]) -> "_Initial":
         """Initial values of the states, the symbols of their start values, and the starts that may be set."""
         flat, system = self.flat.variables, self.system
-        x_start = ca.SX.sym("x_start", len(states))
+        x_start = column(ca.SX.sym(f"start({s})") for s in states)
         required = list(equations)
         optional: list[tuple[ca.SX, str]] = []
         owner: dict[str, str] = {}
@@ -427,7 +444,12 @@ class _Builder:
         free = {v.name: self.memory.values[v.name] for v in self.free}
         result = system.solve_initial(required, optional, free, guesses, self.flat.name)
         solution, used, blocks = result
-        values = {n: self._evaluate(flat[owner[label]].start) or 0.0 for label in used if label in owner for n in [owner[label]]}
+        values = {
+            n: self._evaluate(flat[owner[label]].start) or 0.0
+            for label in used
+            if label in owner
+            for n in [owner[label]]
+        }
         touched = {str(s) for b in blocks for s in ca.symvar(b.guess)}
         for index, name in enumerate(states):  # a start value that is only a guess can be set, too
             if name not in values and str(x_start.nz[index]) in touched:
@@ -439,6 +461,7 @@ class _Builder:
             blocks=blocks,
             y_start=column([solution[n] for b in system.blocks for n in b.names]),
             free={n: solution[n] for n in free},
+            guesses=guesses,
         )
 
 
@@ -452,6 +475,7 @@ class _Initial:
     blocks: tuple[Block, ...]
     y_start: ca.SX
     free: dict[str, ca.SX]
+    guesses: dict[str, ca.SX]
 
 
 class _Table:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from thsa_cosim.export.causal import CausalModel, ModelVariable
+from thsa_cosim.export.causal import CausalModel, ModelVariable, column
 from thsa_cosim.export.emit import number, statements
 from thsa_cosim.export.graph import Graph
 from thsa_cosim.export.implicit import Implicit
@@ -73,6 +73,7 @@ def config_header(model: CausalModel, model_identifier: str, token: str, toleran
         f"#define N_T {model.events.samples.shape[0]}",
         f"#define N_R {int(model.events.reinit.numel() > 0)}",
         f"#define N_A {model.assertions.numel()}",
+        f"#define N_GUESS {int(model.g_start.numel() > 0)}",
         f"#define N_IMPLICIT {model.y.numel()}",
         f"#define DEFAULT_TOLERANCE {tolerance!r}",
     ]
@@ -87,12 +88,12 @@ def model_source(model: CausalModel) -> ModelSource:
     """C source of every function of ``model.h``, and the tables of start values."""
     t, x, u, p, d, m = model.time, model.x, model.u, model.p, model.d, model.m
     n_x, n_p = x.numel(), p.numel()
-    seeds = ca.SX.sym("sx", n_x), ca.SX.sym("su", u.numel()), ca.SX.sym("sp", n_p)
+    seeds = (_symbols("sx", n_x), _symbols("su", u.numel()), _symbols("sp", n_p))
     symbols = {t.name(): "t"}
     arrays = {"x": x, "u": u, "p": p, "d": d, "m": m, "x_start": model.x_start}
     arrays |= dict(zip(("sx", "su", "sp"), seeds, strict=True))
-    for array, column in arrays.items():
-        symbols |= {column.nz[i].name(): f"{array}[{i}]" for i in range(column.numel())}
+    for array, entries in arrays.items():
+        symbols |= {entries.nz[i].name(): f"{array}[{i}]" for i in range(entries.numel())}
     dependent_rate = ca.SX(d.numel(), 1)
     if d.numel() and n_p:
         dependent_rate = ca.jtimes(model.dependent, p, seeds[2])
@@ -102,8 +103,8 @@ def model_source(model: CausalModel) -> ModelSource:
 
     def outputs(**columns: ca.SX) -> list[tuple[str, int]]:
         listed = []
-        for array, column in columns.items():
-            listed += [(f"{array}[{i}]", node) for i, node in enumerate(graph.add_column(column))]
+        for array, entries in columns.items():
+            listed += [(f"{array}[{i}]", node) for i, node in enumerate(graph.add_column(entries))]
         return listed
 
     rates = implicit.rates
@@ -133,12 +134,16 @@ def model_source(model: CausalModel) -> ModelSource:
         rare["assertions"] = outputs(a=model.assertions)
     alone = {"dependent": outputs(d=model.dependent), "initial": outputs(x=model.initial)}
     if implicit.size:
-        alone["initial"] += [(f"y[{i}]", node) for i, node in enumerate(graph.add_column(model.y_start))]
+        alone["initial"] += [(f"v[{i}]", node) for i, node in enumerate(graph.add_column(model.y_start))]
     if events.used:
         alone["discrete_start"] = outputs(z=events.z_start)
+    if model.g_start.numel():
+        alone["first_indicators"] = outputs(g=model.g_start)
     if events.samples.numel():
         alone["samples"] = [
-            (f"s[{2 * row + c}]", graph.add(events.samples[row, c])) for row in range(events.samples.shape[0]) for c in (0, 1)
+            (f"s[{2 * row + c}]", graph.add(events.samples[row, c]))
+            for row in range(events.samples.shape[0])
+            for c in (0, 1)
         ]
     slow = _slow_nodes(graph, model, [node for listed in frequent.values() for _, node in listed])
     cached = {node: f"q[{index}]" for index, node in enumerate(slow.nodes)}
@@ -170,6 +175,11 @@ class _Slow:
 
     nodes: list[int]
     inputs: list[int]
+
+
+def _symbols(name: str, size: int) -> ca.SX:
+    """A column of symbols whose names no variable of a model can have."""
+    return column(ca.SX.sym(f"{name}({k})") for k in range(size))
 
 
 def _parameters(model: CausalModel) -> frozenset[str]:
@@ -243,6 +253,7 @@ _ARGUMENTS = {
     "jacobian": f"{_POINT}, double *A, double *B, double *ft",
     "discrete": f"{_POINT}, double *z",
     "discrete_start": f"{_POINT}, const double *x_start, double *z",
+    "first_indicators": _POINT.replace("const double *x, ", "") + ", const double *x_start, double *g",
     "reinit": f"{_POINT}, double *x_new",
     "assertions": f"{_POINT}, double *a",
     "samples": "const double *p, const double *d, double *s",

@@ -8,7 +8,9 @@ from thsa_cosim.export.structure import match
 from thsa_cosim.modelica.flat import FlatEquation, FlatModel, FlatVariable
 from thsa_cosim.modelica.terms import Scalar, Term, make, walk
 
-_BOOLEAN = frozenset(("and", "or", "not", "<", "<=", ">", ">=", "==", "<>", "edge", "change", "initial", "sample"))
+_BOOLEAN = frozenset(
+    ("and", "or", "not", "<", "<=", ">", ">=", "==", "<>", "edge", "change", "initial", "sample")
+)
 _REAL = frozenset(("/", "^", "der", "sqrt", "exp", "log", "log10", "sin", "cos", "tan", "asin", "acos", "atan", "atan2",
                    "sinh", "cosh", "tanh"))  # fmt: skip
 
@@ -31,9 +33,7 @@ def split_discrete(flat: FlatModel) -> Discrete:
     unknown = {
         v.name: v for v in flat.variables.values() if v.variability == "discrete" and v.causality != "input"
     }
-    definitions: dict[str, Scalar] = {
-        v.name: v.binding for v in unknown.values() if v.binding is not None
-    }
+    definitions: dict[str, Scalar] = {v.name: v.binding for v in unknown.values() if v.binding is not None}
     candidates, rest = [], []
     for equation in flat.equations:
         solved = _solutions(equation, flat, unknown)
@@ -53,7 +53,9 @@ def split_discrete(flat: FlatModel) -> Discrete:
     if spare:
         raise ModelicaError(f"{spare[0].place}: the equation {spare[0]} is one too many.")
     starts, initial = _starts(flat, unknown)
-    return Discrete(definitions, _inline(flat, definitions, starts, unknown), starts, tuple(rest), tuple(initial))
+    return Discrete(
+        definitions, _inline(flat, definitions, starts, unknown), starts, tuple(rest), tuple(initial)
+    )
 
 
 def _solutions(
@@ -71,7 +73,9 @@ def _solutions(
         if whole or unknown[name].type == "Real":
             found[name] = make("not", value) if negated else value
     if not found and whole and equation.left != 0.0:
-        raise ModelicaError(f"{equation.place}: the equation {equation} of discrete variables cannot be solved.")
+        raise ModelicaError(
+            f"{equation.place}: the equation {equation} of discrete variables cannot be solved."
+        )
     return found
 
 
@@ -80,7 +84,7 @@ def _name(term: Scalar) -> str | None:
 
 
 def kind(value: Scalar, flat: FlatModel) -> str:
-    """"Boolean", "Integer" or "Real"."""
+    """ "Boolean", "Integer" or "Real"."""
     for _ in range(10_000):
         if isinstance(value, bool):
             return "Boolean"

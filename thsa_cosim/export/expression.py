@@ -87,7 +87,12 @@ class Memory:
 
     def symbols(self) -> set[str]:
         """Names of the symbols that change at events only."""
-        held = [*self.values.values(), *self.before.values(), *(tick for *_, tick in self.samples), self.initial]
+        held = [
+            *self.values.values(),
+            *self.before.values(),
+            *(tick for *_, tick in self.samples),
+            self.initial,
+        ]
         return {str(symbol) for symbol in held}
 
 
@@ -164,7 +169,9 @@ class Translator:
             return ca.if_else(self.real(args[0]) == self._before(args[0]), 0, 1)
         if op == "edge":
             now, before = self.real(args[0]), self._before(args[0])
-            return ca.logic_and(ca.logic_and(now, ca.logic_not(before)), ca.logic_not(self.memory.is_initial()))
+            return ca.logic_and(
+                ca.logic_and(now, ca.logic_not(before)), ca.logic_not(self.memory.is_initial())
+            )
         if op == "sample":
             return self._sample(*(self.real(a) for a in args))
         raise ModelicaError(f"the function {op}() is a limit of this exporter.")
@@ -188,7 +195,7 @@ class Translator:
         for mode, indicator in zip(self.modes, self.indicators, strict=True):
             if ca.is_equal(indicator, difference, 20):
                 return mode
-        mode = ca.SX.sym(f"mode[{len(self.modes)}]")
+        mode = ca.SX.sym(f"mode({len(self.modes)})")
         self.modes.append(mode)
         self.indicators.append(difference)
         return mode
@@ -256,7 +263,7 @@ class Translator:
         for known_start, known_interval, tick in self.memory.samples:
             if ca.is_equal(known_start, start, 20) and ca.is_equal(known_interval, interval, 20):
                 return tick
-        tick = ca.SX.sym(f"tick[{len(self.memory.samples)}]")
+        tick = ca.SX.sym(f"tick({len(self.memory.samples)})")
         self.memory.samples.append((start, interval, tick))
         return tick
 
@@ -285,7 +292,9 @@ class Translator:
         self._floors.append((value, now))
         above = ca.logic_not(self._mode(now + 1 - value))
         below = self._mode(now - value)
-        step = select(above, ca.fmax(now + 1, ca.floor(value)), select(below, ca.fmin(now - 1, ca.floor(value)), now))
+        step = select(
+            above, ca.fmax(now + 1, ca.floor(value)), select(below, ca.fmin(now - 1, ca.floor(value)), now)
+        )
         self.memory.updates[name] = select(self.memory.is_initial(), ca.floor(value), step)
         return now
 

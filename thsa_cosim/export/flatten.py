@@ -1,6 +1,7 @@
 """A class by its name or by its file → the flat model; where the libraries are looked for."""
 
 import os
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -161,10 +162,13 @@ def _chosen(file: Path, library: Library, classes: list[ClassDefinition]) -> str
     free = [name for name in candidates if name.rsplit(".", 1)[-1] not in used]
     if len(free) == 1:
         return free[0]
-    listed = ", ".join(free or candidates)
-    raise ModelicaError(
-        f"{file}: holds several models ({listed}); say which one: thsa-cosim export NAME --library {file}."
+    chosen, *others = free or candidates
+    warnings.warn(
+        f"{file}: holds several models; {chosen} is exported, the first that no other one uses. For another one "
+        f"({', '.join(others)}): thsa-cosim export NAME --library {file}.",
+        stacklevel=2,
     )
+    return chosen
 
 
 def _types(definition: ClassDefinition) -> Iterator[str]:

@@ -34,13 +34,13 @@ class Implicit:
         self.size = model.y.numel()
         n_x, n_u = model.x.numel(), model.u.numel()
         self.rates = Rates(
-            ca.SX.sym("yx", self.size, n_x), ca.SX.sym("yu", self.size, n_u), ca.SX.sym("yt", self.size, 1),
-            ca.SX.sym("ys", self.size, 1),
+            _symbols("yx", self.size, n_x), _symbols("yu", self.size, n_u), _symbols("yt", self.size, 1),
+            _symbols("ys", self.size, 1),
         )  # fmt: skip
         self.columns = n_x + n_u + 1
         self._seeds = seeds
         self._dependent_rate = dependent_rate
-        self.symbols = {model.y.nz[i].name(): f"y[{i}]" for i in range(self.size)}
+        self.symbols = {model.y.nz[i].name(): f"v[{i}]" for i in range(self.size)}
         for symbol, first in ((self.rates.x, 0), (self.rates.u, n_x), (self.rates.t, n_x + n_u)):
             for i in range(symbol.numel()):
                 self.symbols[symbol.nz[i].name()] = f"S[{first * self.size + i}]"
@@ -67,7 +67,7 @@ class Implicit:
 
     def begin(self, name: str) -> list[str]:
         """The first statements of a function: bring y, and its derivatives, up to date."""
-        if name in ("dependent", "samples"):
+        if name in ("dependent", "samples", "first_indicators"):
             return []
         if name in ("initial", "discrete_start"):
             lines = []
@@ -77,13 +77,13 @@ class Implicit:
                     "  if (solve_initial(t, u, p, d, m, x_start, y0)) return 1;",
                 ]
             if self.size:
-                lines.append("  double *y = implicit_of(d);")
+                lines.append("  double *v = implicit_of(d);")
                 if name == "discrete_start":
                     lines.append("  if (solve(t, x, u, p, d, m)) return 1;")
-            return [*lines, "  (void)y;"] if self.size else lines
+            return [*lines, "  (void)v;"] if self.size else lines
         if not self.size:
             return []
-        lines = ["  double *y = implicit_of(d);", "  (void)y;", "  if (solve(t, x, u, p, d, m)) return 1;"]
+        lines = ["  double *v = implicit_of(d);", "  (void)v;", "  if (solve(t, x, u, p, d, m)) return 1;"]
         if name == "jacobian":
             lines += [
                 f"  double S[{self.size * self.columns}];",
@@ -105,7 +105,7 @@ class Implicit:
         lines = ['#include "newton.h"', ""]
         if self.size:
             lines += [
-                "static double *implicit_of(const double *d) { return (double *)d + N_D + %d; }" % own,
+                f"static double *implicit_of(const double *d) {{ return (double *)d + N_D + {own}; }}",
                 "",
             ]
         lines += self._solve(graph, symbols)
@@ -114,7 +114,9 @@ class Implicit:
             lines += self._rates(graph, symbols)
         return lines
 
-    def _residual(self, graph: Graph, symbols: dict[str, str], name: str, block: Block, y: str, extra: str) -> list[str]:
+    def _residual(
+        self, graph: Graph, symbols: dict[str, str], name: str, block: Block, y: str, extra: str
+    ) -> list[str]:
         """``static int name(const Point *at, double *f, double *jacobian)``."""
         f = [(f"f[{i}]", node) for i, node in enumerate(graph.add_column(block.residual))]
         matrix = ca.jacobian(block.residual, block.unknown)
@@ -146,12 +148,12 @@ class Implicit:
             return []
         lines = []
         for k, block in enumerate(self.model.blocks):
-            lines += self._residual(graph, symbols, f"block_{k}", block, "y", "")
+            lines += self._residual(graph, symbols, f"block_{k}", block, "v", "")
         lines += [
             f"static int solve({_POINT}) {{",
-            "  double *y = implicit_of(d);",
-            "  const Point at = {t, x, u, p, d, m, y};",
-            *self._calls(self.model.blocks, "block_", "y"),
+            "  double *v = implicit_of(d);",
+            "  const Point at = {t, x, u, p, d, m, v};",
+            *self._calls(self.model.blocks, "block_", "v"),
             "  return 0;",
             "}",
             "",
@@ -201,9 +203,9 @@ class Implicit:
             outputs += [(f"S[{i}]", node) for i, node in enumerate(graph.add_column(right))]
             made += [
                 f"static int {name}({_POINT}{arguments}, double *S) {{",
-                f"  double *y = implicit_of(d), R[{n * n}];",
+                f"  double *v = implicit_of(d), R[{n * n}];",
                 f"  int pivot[{n}];",
-                "  (void)t; (void)x; (void)u; (void)p; (void)d; (void)m; (void)y;",
+                "  (void)t; (void)x; (void)u; (void)p; (void)d; (void)m; (void)v;",
                 *(["  (void)sx; (void)su; (void)sp;"] if arguments else []),
                 *statements(graph, outputs, symbols, {}),
                 f"  return newton_linear({n}, {columns}, R, S, pivot);",
@@ -211,6 +213,12 @@ class Implicit:
                 "",
             ]
         return made
+
+
+def _symbols(name: str, rows: int, columns: int) -> ca.SX:
+    """A matrix of symbols whose names no variable of a model can have."""
+    made = [ca.SX.sym(f"{name}({k})") for k in range(rows * columns)]
+    return ca.reshape(column(made), rows, columns)
 
 
 def _dense(block: Block) -> Block:

@@ -1,5 +1,6 @@
 """The equation system of one model: state selection, block order and symbolic solution."""
 
+import math
 from dataclasses import dataclass
 
 import casadi as ca
@@ -9,6 +10,7 @@ from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export.structure import Incidence, blocks, match, reduce_index
 
 LARGEST_SYMBOLIC = 3
+STABILIZATION = 10.0  # 1/s
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,7 @@ class EquationSystem:
         self._preference: dict[str, tuple[int, ...]] = {}
         self._derivatives: dict[str, str] = {}
         self.blocks: tuple[Block, ...] = ()
+        self._full: tuple[list[ca.SX], list[str]] = ([], [])
 
     def add_variable(self, name: str, symbol: ca.SX, preference: tuple[int, ...] = (-1,)) -> int:
         """Add an unknown; the higher ``preference`` sorts, the rather it becomes a state."""
@@ -85,10 +88,22 @@ class EquationSystem:
             return self._columns[self._derivatives[self.names[column]]]
 
         limit = 4 * len(incidence) + 16
-        if not reduce_index(incidence, derivative_of, differentiate_equation, differentiate_variable, limit):
+        derived = reduce_index(incidence, derivative_of, differentiate_equation, differentiate_variable, limit)
+        if derived is None:
             raise ModelicaError(
                 f"{model}: the system is structurally singular; constraints cannot be differentiated to an end."
             )
+        self._full = (list(self.residuals), list(self.labels))
+        chosen = self._choose(incidence, derivative_of, model)
+        moving = self._moving(derived)
+        if moving:
+            self._stabilize(moving, derived)
+            incidence = [self.incidence(residual) for residual in self.residuals]
+            chosen = self._choose(incidence, derivative_of, model)
+        return [name for name in self.names if name in chosen]
+
+    def _choose(self, incidence: Incidence, derivative_of: dict[int, int], model: str) -> set[str]:
+        """Match unknowns and equations; what is left of the candidates are the states."""
         self._rows = incidence
         candidates = sorted(self._derivatives, key=lambda n: self._preference[n])
         mandatory = [column for column in range(len(self.names)) if column not in derivative_of]
@@ -104,7 +119,42 @@ class EquationSystem:
             raise ModelicaError(
                 f"{model}: {name} would have to be a state; name it with a variable of its own."
             )
-        return [name for name in self.names if name in chosen]
+        return chosen
+
+    def _moving(self, derived: dict[int, int]) -> list[int]:
+        """Constraints between states that no choice of states solves everywhere: their slopes are not constant."""
+        first = set(derived) - set(derived.values())
+        found = []
+        for block in blocks(self._rows, self._matching):
+            rows = [row for row, _ in block if row in first]
+            if not rows:
+                continue
+            unknown = ca.vertcat(*[self.symbols[self.names[column]] for _, column in block])
+            matrix = ca.jacobian(ca.vertcat(*[self.residuals[row] for row, _ in block]), unknown)
+            if {str(s) for s in ca.symvar(matrix)} & self._columns.keys():
+                found += rows
+        return found
+
+    def _stabilize(self, moving: list[int], derived: dict[int, int]) -> None:
+        """Keep all states of these constraints; (d/dt + rate)^n c = 0 lets them drift no further (J. Baumgarte, Comput.
+        Methods Appl. Mech. Eng. 1 (1972) 1)."""
+        drop = set()
+        for row in moving:
+            chain = [row]
+            while chain[-1] in derived:
+                chain.append(derived[chain[-1]])
+            order = len(chain) - 1
+            self.residuals[chain[-1]] = sum(
+                (
+                    math.comb(order, k) * STABILIZATION ** (order - k) * self.residuals[member]
+                    for k, member in enumerate(chain)
+                ),
+                ca.SX(0),
+            )
+            drop |= set(chain[:-1])
+        kept = [row for row in range(len(self.residuals)) if row not in drop]
+        self.residuals = [self.residuals[row] for row in kept]
+        self.labels = [self.labels[row] for row in kept]
 
     def solve(self, model: str) -> dict[str, ca.SX]:
         """Every unknown that is no state, in terms of states, inputs, parameters, modes, time and ``blocks``."""
@@ -145,8 +195,9 @@ class EquationSystem:
         guesses: dict[str, ca.SX],
         model: str,
     ) -> tuple[dict[str, ca.SX], list[str], tuple[Block, ...]]:
-        residuals = [*self.residuals, *[r for r, _ in required]]
-        labels = [*self.labels, *[t for _, t in required]]
+        full, full_labels = self._full
+        residuals = [*full, *[r for r, _ in required]]
+        labels = [*full_labels, *[t for _, t in required]]
         rows = [self.incidence(residual) for residual in residuals]
         columns = list(range(len(self.names)))
         matching = self._match_rows(rows)
@@ -170,7 +221,7 @@ class EquationSystem:
             raise ModelicaError(
                 f"{model}: nothing determines the initial value of {missing[0]}; give it a start value with fixed=true."
             )
-        used = labels[len(self.labels) :]
+        used = labels[len(full_labels) :]
         solver = _Solver(self, rows, residuals, labels, model, guesses)
         return solver.solve(matching), used, tuple(solver.blocks)
 
@@ -274,7 +325,8 @@ class _Solver:
             constant = ca.substitute([residual], [unknown], [ca.SX.zeros(len(names))])[0]
             self.solution.update(zip(names, ca.vertsplit(_linear_solve(matrix, constant)), strict=True))
             return
-        fresh = [ca.SX.sym(f"implicit({n})") for n in names]
+        word = "implicit" if self.guesses is None else "initially"
+        fresh = [ca.SX.sym(f"{word}({n})") for n in names]
         residual = ca.substitute([residual], [unknown], [ca.vertcat(*fresh)])[0]
         self.solution.update(zip(names, fresh, strict=True))
         guess = [self.guesses.get(n, ca.SX(0)) if self.guesses else ca.SX(0) for n in names]
@@ -304,7 +356,9 @@ def _torn(
     return eliminated, ca.vertcat(*rows), rest
 
 
-def _explicit(rows: list[ca.SX], names: list[str], symbols: dict[str, ca.SX]) -> tuple[int, str, ca.SX] | None:
+def _explicit(
+    rows: list[ca.SX], names: list[str], symbols: dict[str, ca.SX]
+) -> tuple[int, str, ca.SX] | None:
     unknown = {str(symbols[n]): n for n in names}
     counted = []
     for index, row in enumerate(rows):

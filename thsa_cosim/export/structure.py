@@ -73,13 +73,14 @@ def reduce_index(
     differentiate_equation: Callable[[int], set[int]],
     differentiate_variable: Callable[[int], int],
     limit: int,
-) -> bool:
+) -> dict[int, int] | None:
     """Pantelides' algorithm: differentiate the equations that constrain states.
 
     ``incidence`` and ``derivative_of`` (variable → its derivative) grow in place.
     ``differentiate_equation(row)`` appends the derivative of an equation and returns its incidence;
     ``differentiate_variable(column)`` appends the derivative of a variable and returns its column.
-    Returns False when more than ``limit`` equations had to be differentiated (the system is singular).
+    Returns row → row of its derivative, or None when more than ``limit`` equations had to be differentiated (the system
+    is singular).
     """
     derived_row: dict[int, int] = {}
     row_of: dict[int, int] = {}
@@ -97,12 +98,12 @@ def reduce_index(
                 derived_row[seen] = len(incidence)
                 incidence.append(differentiate_equation(seen))
                 if len(derived_row) > limit:
-                    return False
+                    return None
             for column in seen_columns:
                 if column in row_of:
                     row_of[derivative_of[column]] = derived_row[row_of[column]]
             row = derived_row[row]
-    return True
+    return derived_row
 
 
 def _augment(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +17,22 @@ if TYPE_CHECKING:
     from thsa_cosim.modelica.evaluate import Evaluator
 
 SCALAR = frozenset(
-    "sqrt exp log log10 sin cos tan asin acos atan atan2 sinh cosh tanh abs sign div mod rem floor ceil integer".split()
+    re.findall(
+        r"\w+",
+        """
+    sqrt exp log log10 sin cos tan asin acos atan atan2 sinh cosh tanh abs sign div mod rem floor ceil integer
+        """,
+    )
 )
 _REFUSED = frozenset(
-    "delay spatialDistribution inStream actualStream terminal hold previous Clock subSample superSample shiftSample "
-    "backSample noClock interval firstTick activeState initialState transition ticksInState timeInState".split()
+    re.findall(
+        r"\w+",
+        """
+    delay spatialDistribution inStream actualStream terminal hold previous Clock subSample superSample
+    shiftSample backSample noClock interval firstTick activeState initialState transition ticksInState
+    timeInState
+        """,
+    )
 )
 
 
@@ -44,7 +56,9 @@ def call(evaluator: Evaluator, expression: Syntax) -> Value:
         return name.endswith("isRoot") or False
     target = evaluator.scope.find_class(name)
     if target is None:
-        raise evaluator.error(expression, f"the function {name} is not known.{did_you_mean(name, [*_TABLE, *SCALAR])}")
+        raise evaluator.error(
+            expression, f"the function {name} is not known.{did_you_mean(name, [*_TABLE, *SCALAR])}"
+        )
     from thsa_cosim.modelica.function import apply
 
     return apply(evaluator, target, expression)

@@ -44,7 +44,9 @@ class Connections:
             return
         flows = ("flow" in a.prefixes) + ("flow" in b.prefixes)
         if flows == 1:
-            raise ModelicaError(f"{place}: connect() of the flow variable with the other: {a.name}, {b.name}.")
+            raise ModelicaError(
+                f"{place}: connect() of the flow variable with the other: {a.name}, {b.name}."
+            )
         if "stream" in a.prefixes:
             raise ModelicaError(f"{place}: stream connectors are a limit of this exporter ({a.name}).")
         keys = ((a.name, a_inside), (b.name, b_inside)) if flows else (a.name, b.name)
@@ -57,7 +59,9 @@ class Connections:
     def _connectors(self, a: Scope, b: Scope, a_inside: bool, b_inside: bool, place: str) -> None:
         for scope in (a, b):
             if "expandable" in scope.definition.prefixes:
-                raise ModelicaError(f"{place}: expandable connectors are a limit of this exporter ({scope.path}).")
+                raise ModelicaError(
+                    f"{place}: expandable connectors are a limit of this exporter ({scope.path})."
+                )
         names = [n for n in a.elements if a.declares(n)]
         others = [n for n in b.elements if b.declares(n)]
         if set(names) != set(others):
@@ -66,8 +70,11 @@ class Connections:
         for name in names:
             self.connect(a.component(name), b.component(name), a_inside, b_inside, place)
 
-    def equations(self, variables: dict[str, Variable]) -> list[tuple[Scalar, Scalar, str]]:
-        """Left side, right side and place of all equations of the connections."""
+    def equations(self, variables: dict[str, Variable], given: set[str]) -> list[tuple[Scalar, Scalar, str]]:
+        """Left side, right side and place of all equations of the connections.
+
+        A flow that is not connected is zero, unless an equation outside of its component says what it is (``given``).
+        """
         sets: dict[Any, list[Any]] = {}
         for key in self._parent:
             sets.setdefault(self._root(key), []).append(key)
@@ -87,6 +94,6 @@ class Connections:
                     connected.add(name)
             made.append((sum_, 0.0, place))
         for variable in variables.values():
-            if "flow" in variable.prefixes and variable.name not in connected:
+            if "flow" in variable.prefixes and variable.name not in connected | given:
                 made.append((Term("ref", (variable.name,)), 0.0, variable.place))
         return made

@@ -25,6 +25,7 @@ class Collector:
         self.assertions: list[Assertion] = []
         self.connections = Connections()
         self.discrete: set[str] = set()
+        self.given_flows: set[str] = set()
         self._seen: set[int] = set()
 
     def collect(self, scope: Scope) -> None:
@@ -60,7 +61,9 @@ class Collector:
 
     # -- equations
 
-    def of(self, equation: Equation, evaluator: Evaluator, initial: bool = False, guard: Scalar = True) -> list[FlatEquation]:
+    def of(
+        self, equation: Equation, evaluator: Evaluator, initial: bool = False, guard: Scalar = True
+    ) -> list[FlatEquation]:
         """Scalar equations of one equation; ``guard`` is the condition of the branch around it."""
         op, place = equation.op, evaluator.scope.place(equation.line)
         if op == "equal":
@@ -93,7 +96,19 @@ class Collector:
                 if item.op != "colon":
                     made += paired(evaluator.value(item), value, place)
             return made
-        return paired(evaluator.value(left_side), right[0] if isinstance(right, tuple) else right, place)
+        made = paired(evaluator.value(left_side), right[0] if isinstance(right, tuple) else right, place)
+        self._note_flows(made, evaluator)
+        return made
+
+    def _note_flows(self, made: list[FlatEquation], evaluator: Evaluator) -> None:
+        """Remember flows of components' connectors that an equation around the component gives."""
+        depth = (evaluator.scope.instance.path or "").count(".") + bool(evaluator.scope.instance.path)
+        for equation in made:
+            for side in (equation.left, equation.right):
+                if isinstance(side, Term) and side.op == "ref" and side.args[0].count(".") >= depth + 2:
+                    variable = evaluator.scope.world.variables.get(side.args[0])
+                    if variable is not None and "flow" in variable.prefixes:
+                        self.given_flows.add(side.args[0])
 
     def _connect(self, equation: Equation, evaluator: Evaluator, place: str) -> None:
         nodes, inside = [], []
@@ -156,7 +171,9 @@ class Collector:
     ) -> list[FlatEquation]:  # fmt: skip
         where = Syntax("number", (0,), equation.line)
         for condition, body in chosen:
-            if evaluator.fixed(condition, where, "the condition of branches with different numbers of equations"):
+            if evaluator.fixed(
+                condition, where, "the condition of branches with different numbers of equations"
+            ):
                 return [made for inner in body for made in self.of(inner, evaluator, initial, guard)]
         return [made for inner in last for made in self.of(inner, evaluator, initial, guard)]
 
@@ -172,7 +189,9 @@ class Collector:
             raise ModelicaError(f"{place}: terminate() is a limit of this exporter.")
         elif not name.startswith(("Connections.", ".Connections.")):
             value = evaluator.value(call)
-            if any(isinstance(v, Term) for v in elements(value if not isinstance(value, tuple) else list(value))):
+            if any(
+                isinstance(v, Term) for v in elements(value if not isinstance(value, tuple) else list(value))
+            ):
                 raise ModelicaError(f"{place}: the call of {name}() has no effect here.")
         return []
 
@@ -237,11 +256,15 @@ class Collector:
                 for flat in self.of(equation, evaluator, False, guard):
                     left = flat.left
                     if not (isinstance(left, Term) and left.op == "ref"):
-                        raise ModelicaError(f"{place}: an equation in a when clause has to be 'variable = expression'.")
+                        raise ModelicaError(
+                            f"{place}: an equation in a when clause has to be 'variable = expression'."
+                        )
                     assigned[left.args[0]] = flat.right
         return assigned
 
-    def _when_if(self, equation: Equation, evaluator: Evaluator, guard: Scalar, assigned: dict[str, Scalar]) -> None:
+    def _when_if(
+        self, equation: Equation, evaluator: Evaluator, guard: Scalar, assigned: dict[str, Scalar]
+    ) -> None:
         branches, otherwise = equation.args
         conditions, results = [], []
         remaining = guard
@@ -281,7 +304,9 @@ class Collector:
         made = []
         for name in env:
             whole = evaluator.value(Syntax("name", ((name, ()),), section[0].line))
-            for old, reference, value in zip(elements(env[name]), elements(whole), elements(after[name]), strict=True):
+            for old, reference, value in zip(
+                elements(env[name]), elements(whole), elements(after[name]), strict=True
+            ):
                 if value is old:
                     continue
                 if isinstance(reference, Term) and reference.op == "ref":
@@ -378,7 +403,9 @@ def _selected(conditions: list[Scalar], sides: list[list[FlatEquation]], place: 
         return left.args[0] if isinstance(left, Term) and left.op == "ref" else None
 
     first = [target(e) for e in sides[0]]
-    by_name = None not in first and all(sorted(map(str, map(target, s))) == sorted(map(str, first)) for s in sides)
+    by_name = None not in first and all(
+        sorted(map(str, map(target, s))) == sorted(map(str, first)) for s in sides
+    )
     if by_name and len(set(first)) == len(first):
         sides = [sorted(side, key=lambda e: first.index(target(e))) for side in sides]
     made = []
@@ -419,7 +446,9 @@ def _implicit_range(name: str, body: list[Equation], where: Syntax) -> Syntax:
                     for place, subscript in enumerate(subscripts):
                         if subscript.op == "name" and subscript.args == ((name, ()),):
                             array = (*part.args[:depth], (part.args[depth][0], ()))
-                            size = Syntax("call", ("size", (Syntax("name", array, part.line), Syntax("number", (place + 1,), part.line)), {}), part.line)  # fmt: skip
+                            axis = Syntax("number", (place + 1,), part.line)
+                            whole = Syntax("name", array, part.line)
+                            size = Syntax("call", ("size", (whole, axis), {}), part.line)
                             return Syntax("range", (Syntax("number", (1,), part.line), None, size), part.line)
             return search(part.args)
         if isinstance(part, (tuple, list)):
@@ -461,7 +490,9 @@ def _before(value: Value, evaluator: Evaluator, discrete: bool, initial: bool) -
     if isinstance(value, list):
         return [_before(v, evaluator, discrete, initial) for v in value]
     if isinstance(value, Record):
-        return Record(value.type, {k: _before(v, evaluator, discrete, initial) for k, v in value.fields.items()})
+        return Record(
+            value.type, {k: _before(v, evaluator, discrete, initial) for k, v in value.fields.items()}
+        )
     if not isinstance(value, Term) or value.op != "ref":
         return value
     variable = evaluator.scope.world.variables.get(value.args[0])

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 from thsa_cosim.errors import ModelicaError, did_you_mean
 from thsa_cosim.modelica import builtin
-from thsa_cosim.modelica.arrays import Record, Value, binary, concatenate, each, elements, fill, promote, shape
+from thsa_cosim.modelica.arrays import (
+    Record,
+    Value,
+    binary,
+    concatenate,
+    each,
+    elements,
+    fill,
+    promote,
+    shape,
+)
 from thsa_cosim.modelica.modifier import Binding
 from thsa_cosim.modelica.scope import DISABLED, Scope, Variable
 from thsa_cosim.modelica.syntax import Syntax
@@ -24,7 +34,9 @@ _RELATIONS = frozenset(("<", "<=", ">", ">=", "==", "<>"))
 class Evaluator:
     """Evaluates expressions in a scope; ``local`` holds loop variables and the variables of a function."""
 
-    def __init__(self, scope: Scope, local: Mapping[str, Value] | None = None, in_function: bool = False) -> None:
+    def __init__(
+        self, scope: Scope, local: Mapping[str, Value] | None = None, in_function: bool = False
+    ) -> None:
         self.scope = scope
         self.local: dict[str, Value] = dict(local or {})
         self.in_function = in_function
@@ -35,6 +47,7 @@ class Evaluator:
         return Evaluator(self.scope, {**self.local, **local}, self.in_function)
 
     def error(self, expression: Syntax, what: str) -> ModelicaError:
+        """The error with file and line of an expression."""
         return ModelicaError(f"{self.scope.place(expression.line)}: {what}")
 
     def value(self, expression: Syntax) -> Value:
@@ -187,7 +200,9 @@ class Evaluator:
         if values.op == "name":
             found = self.scope.find_class(".".join(p for p, _ in values.args))
             if found is not None and found.definition.literals:
-                return [Enumeration(found.qualified, n, i + 1) for i, n in enumerate(found.definition.literals)]
+                return [
+                    Enumeration(found.qualified, n, i + 1) for i, n in enumerate(found.definition.literals)
+                ]
         result = self.value(values)
         if not isinstance(result, list):
             raise self.error(values, f"the loop over {name} needs a vector.")
@@ -291,7 +306,9 @@ class Evaluator:
 
     def _unknown(self, expression: Syntax, name: str) -> ModelicaError:
         known = [*self.scope.elements, *self.local]
-        return self.error(expression, f"the name {_written(expression)} is not known.{did_you_mean(name, known)}")
+        return self.error(
+            expression, f"the name {_written(expression)} is not known.{did_you_mean(name, known)}"
+        )
 
     def of_node(self, node: Any, where: Syntax) -> Value:
         """Value of a component."""
@@ -304,7 +321,9 @@ class Evaluator:
         if isinstance(node, Scope):
             if node.path is None:
                 if node.definition.literals:
-                    return [Enumeration(node.qualified, n, i + 1) for i, n in enumerate(node.definition.literals)]
+                    return [
+                        Enumeration(node.qualified, n, i + 1) for i, n in enumerate(node.definition.literals)
+                    ]
                 raise self.error(where, f"{_written(where)} is a class, not a value.")
             names = [n for n in node.elements if node.declares(n)]
             fields = {n: node.component(n) for n in names}
@@ -342,7 +361,9 @@ class Evaluator:
         if isinstance(index, float) and index == int(index):
             index = int(index)
         if not isinstance(index, int) or not 1 <= index <= len(value):
-            raise self.error(where, f"the subscript {text(index)} of {_written(where)} is not in 1:{len(value)}.")
+            raise self.error(
+                where, f"the subscript {text(index)} of {_written(where)} is not in 1:{len(value)}."
+            )
         return value[index - 1]
 
     def _variable_index(self, value: list[Any], index: Term, where: Syntax) -> Value:

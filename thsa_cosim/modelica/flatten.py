@@ -53,13 +53,18 @@ def _flatten(library: Library, name: str) -> FlatModel:
             f"{declared.place(definition.line)}: {name} is a {definition.kind}; a model or block is needed to export."
         )
     if "partial" in definition.prefixes:
-        raise ModelicaError(f"{declared.place(definition.line)}: {name} is partial; export a class that completes it.")
+        raise ModelicaError(
+            f"{declared.place(definition.line)}: {name} is partial; export a class that completes it."
+        )
     root = Scope(declared.world, definition, declared.parent, declared.given, path="")
     collector = Collector()
     collector.collect(root)
     world = root.world
     equations = list(collector.equations)
-    equations += [FlatEquation(a, b, place) for a, b, place in collector.connections.equations(world.variables)]
+    equations += [
+        FlatEquation(a, b, place)
+        for a, b, place in collector.connections.equations(world.variables, collector.given_flows)
+    ]
     if not world.variables:
         raise ModelicaError(f"{declared.place(definition.line)}: {name} has no variables.")
     variables = {v.name: _variable(v, collector, world) for v in world.variables.values() if v.type in _TYPES}

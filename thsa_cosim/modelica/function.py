@@ -118,13 +118,12 @@ def _default(owner: Scope, declaration: Component, evaluator: Evaluator, where: 
         _ = target.elements
         if target.builtin is None and target.definition.literals is None and target.definition.kind != "type":
             value = _construct_unset(target, where)
-        for dimension in target.definition.dimensions:
-            sizes.append(int(evaluator.structural(dimension, "the size of an array")))
+        sizes += [int(evaluator.structural(d, "the size of an array")) for d in target.definition.dimensions]
     return fill(value, sizes)
 
 
 def _construct_unset(target: Scope, where: Syntax) -> Record:
-    fields = {}
+    fields: dict[str, Value] = {}
     for name, element in _declared(target):
         declaration, owner, mod = resolved(element)
         inner = Evaluator(owner, {}, True)
@@ -305,23 +304,25 @@ class Statements:
                 steps.append(tuple(indices))
         env[name] = self._placed(env[name], steps, value, target, env)
 
-    def _placed(self, old: Value, steps: list[Any], value: Value, target: Syntax, env: dict[str, Value]) -> Value:
+    def _placed(
+        self, old: Value, steps: list[Any], value: Value, target: Syntax, env: dict[str, Value]
+    ) -> Value:
         if not steps:
             return value
         first, rest = steps[0], steps[1:]
         if isinstance(first, str):
             if not isinstance(old, Record):
                 raise self.evaluator.error(target, f"there is no field {first} to assign.")
-            return Record(old.type, {**old.fields, first: self._placed(old.fields[first], rest, value, target, env)})
+            return Record(
+                old.type, {**old.fields, first: self._placed(old.fields[first], rest, value, target, env)}
+            )
         index, *further = first
         inner = [tuple(further), *rest] if further else rest
         if not isinstance(old, list):
             raise self.evaluator.error(target, "an array without a size is assigned element by element.")
         evaluator = self._at(env)
         evaluator.ends.append(len(old))
-        chosen = (
-            list(range(1, len(old) + 1)) if index.op == "colon" else evaluator.value(index)
-        )
+        chosen = list(range(1, len(old) + 1)) if index.op == "colon" else evaluator.value(index)
         new = list(old)
         if isinstance(chosen, list):
             for k, i in enumerate(chosen):
@@ -360,7 +361,9 @@ class Statements:
         for body in bodies:
             after, left = self.run(body, env)
             if left == "break":
-                raise self._error(statement, "a break under a condition that is not known at export is a limit of this exporter.")  # fmt: skip
+                raise self._error(
+                    statement, "a break under a condition unknown at export is a limit of this exporter."
+                )
             if leaves and not left:
                 after, left = self.run(rest, after)
             results.append(after)
@@ -384,7 +387,9 @@ class Statements:
         if isinstance(a, tuple):
             return tuple(self._select(condition, x, y, statement) for x, y in zip(a, b, strict=True))
         if shape(a) != shape(b):
-            raise self._error(statement, "branches that give an array different sizes are a limit of this exporter.")
+            raise self._error(
+                statement, "branches that give an array different sizes are a limit of this exporter."
+            )
 
         def choose(x: Any, y: Any) -> Any:
             if x is UNSET or y is UNSET:
@@ -422,7 +427,9 @@ class Statements:
         for _ in range(MOST_TURNS):
             chosen = self._at(env).value(condition)
             if isinstance(chosen, Term):
-                raise self._error(statement, "a while loop whose condition is not known at export is a limit of this exporter.")  # fmt: skip
+                raise self._error(
+                    statement, "a while loop on a condition unknown at export is a limit of this exporter."
+                )
             if not chosen:
                 return env, ""
             env, left = self.run(body, env)
@@ -448,7 +455,12 @@ class _External:
     """A call of an external function: a built-in one, or a table."""
 
     def __init__(
-        self, target: Scope, positional: list[Value], keyed: dict[str, Value], caller: Evaluator, where: Syntax
+        self,
+        target: Scope,
+        positional: list[Value],
+        keyed: dict[str, Value],
+        caller: Evaluator,
+        where: Syntax,
     ) -> None:
         self.run = _Run(target, positional, keyed, caller, where)
         self.caller, self.where, self.target = caller, where, target
@@ -457,9 +469,7 @@ class _External:
         scope = _implementation(self.target)
         assert scope.definition.external is not None
         language, name = scope.definition.external
-        inputs = [
-            self.run.env[n] for n, e in _declared(self.target) if "input" in e.declaration.prefixes
-        ]
+        inputs = [self.run.env[n] for n, e in _declared(self.target) if "input" in e.declaration.prefixes]
         if language == "builtin":
             short = scope.definition.name if name not in builtin.SCALAR else name
             if short in builtin.SCALAR:
@@ -468,8 +478,9 @@ class _External:
         if found is not None:
             return found(self.caller, self.where, inputs)
         raise self.caller.error(
-            self.where, f"the function {self.target.qualified} is written in {language}, which is a limit of this exporter."
-        )  # fmt: skip
+            self.where,
+            f"the function {self.target.qualified} is written in {language}, which is a limit of this exporter.",
+        )
 
 
 __all__ = ["ClassDefinition", "Statements", "apply", "invoke"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from thsa_cosim.errors import ModelicaError
@@ -12,9 +13,14 @@ from thsa_cosim.modelica.scope import BUILTIN_TYPES, DISABLED, Element, Scope, V
 from thsa_cosim.modelica.syntax import Component, Syntax
 
 ATTRIBUTES = frozenset(
-    "start fixed unit displayUnit quantity min max nominal stateSelect unbounded uncertain".split()
+    re.findall(
+        r"\w+",
+        """
+    start fixed unit displayUnit quantity min max nominal stateSelect unbounded uncertain
+        """,
+    )
 )
-_INHERITED = frozenset("flow stream discrete parameter constant input output".split())
+_INHERITED = frozenset(["flow", "stream", "discrete", "parameter", "constant", "input", "output"])
 _MOST_ELEMENTS = 100_000
 
 
@@ -54,7 +60,11 @@ def _here(owner: Scope, instance: Scope) -> Scope:
 def _refuse_final(element: Element, instance: Scope) -> None:
     """A modification of what was declared final is an error of the model."""
     declaration = element.declaration
-    if "final" in declaration.prefixes and element.modifier is not None and element.modifier.binding is not None:
+    if (
+        "final" in declaration.prefixes
+        and element.modifier is not None
+        and element.modifier.binding is not None
+    ):
         line = element.modifier.binding.value.line
         place = element.modifier.binding.scope.place(line)
         raise ModelicaError(f"{place}: {declaration.name} is final and cannot be modified.")
@@ -70,7 +80,8 @@ def _inner(instance: Scope, name: str, declaration: Component) -> Any:
                 return scope.component(name)
         scope = scope.container
     raise ModelicaError(
-        f"{instance.place(declaration.line)}: {instance.path}.{name} is outer, but no inner {name} is declared around it."
+        f"{instance.place(declaration.line)}: {instance.path}.{name} is outer, but no inner {name} is declared "
+        "around it."
     )
 
 
@@ -137,7 +148,8 @@ class _Maker:
             binding = Binding(member, outer.scope, outer.indices)
         if binding is None:
             raise ModelicaError(
-                f"{self.owner.place(self.declaration.line)}: the size of {path} is ':', but it has no value to take it from."
+                f"{self.owner.place(self.declaration.line)}: the size of {path} is ':', but there is no value to take "
+                "it from."
             )
         sizes = shape(bound(binding))
         if place < len(sizes):
@@ -148,7 +160,9 @@ class _Maker:
             f"{self.owner.place(self.declaration.line)}: the value of {path} has {len(sizes)} dimensions, too few."
         )
 
-    def array(self, path: str, given: Modifier | None, sizes: list[int], indices: tuple[int, ...] = ()) -> Any:
+    def array(
+        self, path: str, given: Modifier | None, sizes: list[int], indices: tuple[int, ...] = ()
+    ) -> Any:
         """Nested lists over the sizes."""
         if not sizes:
             label = f"{path}[{','.join(str(i) for i in indices)}]" if indices else path
@@ -162,14 +176,19 @@ class _Maker:
     def element(self, path: str, given: Modifier | None) -> Any:
         given = self._with_record(path, given)
         target = self.target
-        if target is None or target.builtin is not None or target.definition.literals is not None or _enumeration(target):
+        if (
+            target is None
+            or target.builtin is not None
+            or target.definition.literals is not None
+            or _enumeration(target)
+        ):
             return self._variable(path, given)
-        if "partial" in target.definition.prefixes and target.definition.kind != "connector":
-            if not isinstance(self.instance.definition.file, type(None)) and self.instance.path is not None:
-                raise ModelicaError(
-                    f"{self.owner.place(self.declaration.line)}: the class {target.qualified} of {path} is partial: it "
-                    "has to be redeclared."
-                )
+        incomplete = "partial" in target.definition.prefixes and target.definition.kind != "connector"
+        if incomplete and self.instance.path is not None:
+            raise ModelicaError(
+                f"{self.owner.place(self.declaration.line)}: the class {target.qualified} of {path} is partial: it "
+                "has to be redeclared."
+            )
         return Scope(
             self.instance.world,
             target.definition,
@@ -196,7 +215,8 @@ class _Maker:
 
     def _variable(self, path: str, given: Modifier | None) -> Variable:
         declaration, world = self.declaration, self.instance.world
-        kind, literals = declaration.type, ()
+        kind = declaration.type
+        literals: tuple[str, ...] = ()
         merged = given
         if self.target is not None:
             enumeration = _enumeration(self.target)

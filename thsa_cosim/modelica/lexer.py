@@ -8,10 +8,15 @@ from typing import NamedTuple
 from thsa_cosim.errors import ModelicaError
 
 KEYWORDS = frozenset(
-    "algorithm and annotation block break class connect connector constant constrainedby der discrete each else elseif "
-    "elsewhen encapsulated end enumeration equation expandable extends external false final flow for function if "
-    "import impure in initial inner input loop model not operator or outer output package parameter partial protected "
-    "public pure record redeclare replaceable return stream then true type when while within".split()
+    re.findall(
+        r"\w+",
+        """
+    algorithm and annotation block break class connect connector constant constrainedby der discrete each else
+    elseif elsewhen encapsulated end enumeration equation expandable extends external false final flow for
+    function if import impure in initial inner input loop model not operator or outer output package parameter
+    partial protected public pure record redeclare replaceable return stream then true type when while within
+        """,
+    )
 )
 _TOKEN = re.compile(
     r"""(?P<skip>\s+|//[^\n]*|/\*.*?\*/)
@@ -71,7 +76,9 @@ def tokenize(source: str, file: Path) -> Tokens:
 
 def unquote(text: str) -> str:
     """Value of a string token."""
-    return re.sub(r"\\(.)", lambda found: _ESCAPES.get(found.group(1), found.group(1)), text[1:-1], flags=re.S)
+    return re.sub(
+        r"\\(.)", lambda found: _ESCAPES.get(found.group(1), found.group(1)), text[1:-1], flags=re.S
+    )
 
 
 def read_source(file: Path) -> str:

@@ -60,7 +60,9 @@ class Library:
         for definition in classes:
             if definition.name == name:
                 return definition
-        raise ModelicaError(f"{folder / 'package.mo'}: does not define the package {name}, as its folder says.")
+        raise ModelicaError(
+            f"{folder / 'package.mo'}: does not define the package {name}, as its folder says."
+        )
 
     def nested(self, definition: ClassDefinition, name: str) -> ClassDefinition | None:
         """A class that is defined inside another one, in its text or in its folder."""

@@ -44,7 +44,9 @@ class Modifier:
         return self.children.get(name)
 
 
-def modifier(arguments: list[Argument], value: Syntax | None, scope: Scope, final: bool = False) -> Modifier | None:
+def modifier(
+    arguments: list[Argument], value: Syntax | None, scope: Scope, final: bool = False
+) -> Modifier | None:
     """The modification ``(arguments) = value`` as it stands in a scope; None when it says nothing."""
     if not arguments and value is None:
         return None

@@ -16,11 +16,15 @@ from thsa_cosim.modelica.syntax import (
     Syntax,
 )
 
-_CLASS_KINDS = frozenset("class model block connector record type package function operator".split())
-_CLASS_PREFIXES = frozenset("partial encapsulated expandable pure impure operator".split())
-_ELEMENT_PREFIXES = frozenset("redeclare final inner outer replaceable".split())
-_TYPE_PREFIXES = frozenset("flow stream discrete parameter constant input output".split())
-_SECTIONS = frozenset("public protected equation algorithm initial external annotation end".split())
+_CLASS_KINDS = frozenset(
+    ["class", "model", "block", "connector", "record", "type", "package", "function", "operator"]
+)
+_CLASS_PREFIXES = frozenset(["partial", "encapsulated", "expandable", "pure", "impure", "operator"])
+_ELEMENT_PREFIXES = frozenset(["redeclare", "final", "inner", "outer", "replaceable"])
+_TYPE_PREFIXES = frozenset(["flow", "stream", "discrete", "parameter", "constant", "input", "output"])
+_SECTIONS = frozenset(
+    ["public", "protected", "equation", "algorithm", "initial", "external", "annotation", "end"]
+)
 
 
 def parse_file(file: Path) -> tuple[str, list[ClassDefinition]]:
@@ -165,9 +169,7 @@ class Parser(ExpressionParser):
         else:
             (definition.initial_algorithms if initial else definition.algorithms).append(body)
 
-    def element(
-        self, into: "list[Component | Extends | Import | ClassDefinition]", protected: bool
-    ) -> None:
+    def element(self, into: "list[Component | Extends | Import | ClassDefinition]", protected: bool) -> None:
         if self.accept("import"):
             into.append(self._import())
             self.comment()
@@ -211,9 +213,7 @@ class Parser(ExpressionParser):
             return Import(names, [])
         return Import({first.rsplit(".", 1)[-1]: first}, [])
 
-    def component_clause(
-        self, words: set[str], protected: bool, single: bool = False
-    ) -> list[Component]:
+    def component_clause(self, words: set[str], protected: bool, single: bool = False) -> list[Component]:
         prefixes = set(words)
         while self.kind in _TYPE_PREFIXES:
             prefixes.add(self.advance())

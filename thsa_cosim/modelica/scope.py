@@ -12,16 +12,20 @@ from typing import Any, NamedTuple
 
 from thsa_cosim.errors import ModelicaError, did_you_mean
 from thsa_cosim.modelica.library import Library
-from thsa_cosim.modelica.modifier import Binding, Modifier, element_of, merge, modifier
-from thsa_cosim.modelica.syntax import ClassDefinition, Component, Extends, Import, Syntax
+from thsa_cosim.modelica.modifier import Binding, Modifier, merge, modifier
+from thsa_cosim.modelica.syntax import ClassDefinition, Component, Extends, Import
 
 BUILTIN_TYPES = frozenset(("Real", "Integer", "Boolean", "String", "ExternalObject", "Clock"))
+_TYPE_PREFIXES = frozenset(
+    ["flow", "stream", "discrete", "parameter", "constant", "input", "output", "inner", "outer"]
+)
 _LITERALS = {
     "StateSelect": ("never", "avoid", "default", "prefer", "always"),
     "AssertionLevel": ("error", "warning"),
 }
 _PREDEFINED = {
-    name: ClassDefinition(name, "type", Path("Modelica"), 0, literals=literals) for name, literals in _LITERALS.items()
+    name: ClassDefinition(name, "type", Path("Modelica"), 0, literals=literals)
+    for name, literals in _LITERALS.items()
 }
 
 
@@ -158,7 +162,9 @@ class Scope:
                 continue
             if element.name in found and isinstance(element, Component):
                 continue
-            found[element.name] = Element(element, self, self.given.child(element.name) if self.given else None)
+            found[element.name] = Element(
+                element, self, self.given.child(element.name) if self.given else None
+            )
 
     def _inherit(
         self, base: str, arguments: list[Any], outer: Modifier | None, line: int, found: dict[str, Element]
@@ -304,7 +310,12 @@ class Scope:
         return Scope(self.world, declaration, owner, given)
 
     def _extended(
-        self, replacement: ClassDefinition, scope: Scope, original: ClassDefinition, owner: Scope, given: Modifier
+        self,
+        replacement: ClassDefinition,
+        scope: Scope,
+        original: ClassDefinition,
+        owner: Scope,
+        given: Modifier,
     ) -> Scope:
         raise ModelicaError(
             f"{scope.place(replacement.line)}: class extends {replacement.name} is a limit of this exporter; declare "
@@ -370,11 +381,10 @@ def resolved(element: Element) -> tuple[Component, Scope, Modifier | None]:
         merged = merge(merged, Modifier(Binding(declaration.value, owner)))
     elif merged is None and declaration.value is not None:
         merged = Modifier(Binding(declaration.value, owner))
-    type_prefixes = frozenset("flow stream discrete parameter constant input output inner outer".split())
     combined = Component(
         declaration.name,
         replacement.type,
-        (declaration.prefixes & type_prefixes) | replacement.prefixes,
+        (declaration.prefixes & _TYPE_PREFIXES) | replacement.prefixes,
         replacement.dimensions or declaration.dimensions,
         [],
         None,
@@ -385,8 +395,3 @@ def resolved(element: Element) -> tuple[Component, Scope, Modifier | None]:
         replacement.line,
     )
     return combined, scope, merged
-
-
-__all__ = [
-    "BUILTIN_TYPES", "DISABLED", "Disabled", "Element", "Scope", "Syntax", "Variable", "World", "element_of", "resolved",
-]  # fmt: skip

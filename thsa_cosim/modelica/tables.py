@@ -7,6 +7,7 @@ as ``Modelica.Blocks.Types.Smoothness`` and ``Extrapolation`` say (H. Akima, J. 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from thsa_cosim.modelica.arrays import Value
@@ -23,7 +24,9 @@ HOLD, LAST_TWO, PERIODIC, NONE = 1, 2, 3, 4
 class Table:
     """What an ExternalCombiTable object holds; rows are lists of numbers."""
 
-    def __init__(self, rows: list[list[float]], smoothness: int, extrapolation: int, columns: list[int]) -> None:
+    def __init__(
+        self, rows: list[list[float]], smoothness: int, extrapolation: int, columns: list[int]
+    ) -> None:
         self.rows = rows
         self.smoothness = smoothness
         self.extrapolation = extrapolation
@@ -47,14 +50,22 @@ def _table1(evaluator: Evaluator, where: Syntax, inputs: list[Value]) -> Value:
     name, file, rows, columns, smoothness, *rest = inputs
     _from_file(evaluator, where, name, file)
     extrapolation = plain(rest[0]) if rest else LAST_TWO
-    return Table(_numbers(evaluator, where, rows), plain(smoothness), extrapolation, _numbers(evaluator, where, columns))
+    return Table(
+        _numbers(evaluator, where, rows),
+        plain(smoothness),
+        extrapolation,
+        _numbers(evaluator, where, columns),
+    )
 
 
 def _time_table(evaluator: Evaluator, where: Syntax, inputs: list[Value]) -> Value:
     name, file, rows, start, columns, smoothness, extrapolation, shift, *_ = inputs
     _from_file(evaluator, where, name, file)
     made = Table(
-        _numbers(evaluator, where, rows), plain(smoothness), plain(extrapolation), _numbers(evaluator, where, columns)
+        _numbers(evaluator, where, rows),
+        plain(smoothness),
+        plain(extrapolation),
+        _numbers(evaluator, where, columns),
     )
     made.start = _numbers(evaluator, where, start)
     made.shift = _numbers(evaluator, where, shift)
@@ -71,7 +82,9 @@ def _table2(evaluator: Evaluator, where: Syntax, inputs: list[Value]) -> Value:
 def _value1(evaluator: Evaluator, where: Syntax, inputs: list[Value]) -> Value:
     table, column, u = inputs[:3]
     index = table.columns[evaluator.fixed(column, where, "the column of a table") - 1] - 1
-    return interpolate(evaluator, where, table, [row[0] for row in table.rows], [row[index] for row in table.rows], u)
+    return interpolate(
+        evaluator, where, table, [row[0] for row in table.rows], [row[index] for row in table.rows], u
+    )
 
 
 def _time_value(evaluator: Evaluator, where: Syntax, inputs: list[Value]) -> Value:
@@ -87,7 +100,9 @@ def _time_value(evaluator: Evaluator, where: Syntax, inputs: list[Value]) -> Val
 def _value2(evaluator: Evaluator, where: Syntax, inputs: list[Value]) -> Value:
     table, u1, u2 = inputs[:3]
     if table.smoothness != LINEAR:
-        raise evaluator.error(where, "a two-dimensional table with other than linear segments is a limit of this exporter.")
+        raise evaluator.error(
+            where, "a two-dimensional table with other than linear segments is a limit of this exporter."
+        )
     x = [row[0] for row in table.rows[1:]]
     y = table.rows[0][1:]
     along = [interpolate(evaluator, where, table, y, row[1:], u2) for row in table.rows[1:]]
@@ -108,7 +123,7 @@ def interpolate(
         raise evaluator.error(where, "a table that repeats periodically is a limit of this exporter.")
     if table.smoothness not in (LINEAR, AKIMA, CONSTANT):
         raise evaluator.error(where, "a table with monotone splines is a limit of this exporter.")
-    if any(b < a for a, b in zip(x, x[1:], strict=False)):
+    if any(b < a for a, b in pairwise(x)):
         raise evaluator.error(where, "the first column of the table has to rise.")
     if len(x) == 1:
         return y[0]
@@ -135,7 +150,8 @@ def interpolate(
 def _pieces(smoothness: int, x: list[float], y: list[Scalar], u: Scalar) -> list[Scalar]:
     """A value for every interval of x."""
     slopes = [
-        make("/", make("-", y[k + 1], y[k]), x[k + 1] - x[k]) if x[k + 1] > x[k] else 0.0 for k in range(len(x) - 1)
+        make("/", make("-", y[k + 1], y[k]), x[k + 1] - x[k]) if x[k + 1] > x[k] else 0.0
+        for k in range(len(x) - 1)
     ]
     if smoothness == CONSTANT:
         return list(y[:-1])
@@ -146,7 +162,9 @@ def _pieces(smoothness: int, x: list[float], y: list[Scalar], u: Scalar) -> list
         value = make("+", y[k], make("*", slope, distance))
         if rates is not None:
             h = x[k + 1] - x[k]
-            bend = make("/", make("-", make("-", make("*", 3, slope), make("*", 2, rates[k])), rates[k + 1]), h)
+            bend = make(
+                "/", make("-", make("-", make("*", 3, slope), make("*", 2, rates[k])), rates[k + 1]), h
+            )
             twist = make("/", make("-", make("+", rates[k], rates[k + 1]), make("*", 2, slope)), h * h)
             inner = make("+", bend, make("*", twist, distance))
             value = make("+", y[k], make("*", distance, make("+", rates[k], make("*", distance, inner))))
@@ -160,7 +178,11 @@ def _akima(slopes: list[Scalar]) -> list[float]:
     rates = []
     for k in range(len(slopes) + 1):
         left, right = abs(m[k + 1] - m[k]), abs(m[k + 3] - m[k + 2])
-        rates.append((right * m[k + 1] + left * m[k + 2]) / (left + right) if left + right else (m[k + 1] + m[k + 2]) / 2)
+        rates.append(
+            (right * m[k + 1] + left * m[k + 2]) / (left + right)
+            if left + right
+            else (m[k + 1] + m[k + 2]) / 2
+        )
     return rates
 
 

@@ -199,7 +199,13 @@ def text(value: Scalar, depth: int = 12) -> str:
     if isinstance(value, Enumeration):
         return f"{value.type.rsplit('.', 1)[-1]}.{value.name}"
     if not isinstance(value, Term):
-        return f'"{value}"' if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else str(value)
+        return (
+            f'"{value}"'
+            if isinstance(value, str)
+            else f"{value:g}"
+            if isinstance(value, float)
+            else str(value)
+        )
     if depth == 0:
         return "…"
     op, args = value.op, value.args

@@ -194,6 +194,10 @@ Status instance_initialize(Instance *c) {
 #if N_EVENTS
     discrete_reset(c);
 #endif
+#if N_GUESS
+    if (model_first_indicators(s->now.time, s->now.u, s->p, s->d, s->now.m, s->x_start, c->g) == 0)
+        for (int k = 0; k < N_G; k++) s->now.m[k] = c->g[k] > 0.0;
+#endif
     for (int i = 0; i < MOST_ITERATIONS; i++) {
         instance_changed(c);
         if (model_initial(s->now.time, s->now.u, s->p, s->d, s->now.m, s->x_start, s->now.x) ||

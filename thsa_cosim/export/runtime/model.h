@@ -22,6 +22,7 @@
 #define N_T 0 /* samples */
 #define N_R 0 /* 1: states are reinitialized */
 #define N_A 0 /* assertions */
+#define N_GUESS 0 /* 1: the initial values depend on relations */
 #define N_IMPLICIT 0 /* unknowns of implicit equations, kept at the end of the cache */
 #endif
 #define N_M (N_G + (N_EVENTS ? 2 * N_Z + N_T + 1 : 0)) /* modes, z, pre(z), ticks, initial */
@@ -48,6 +49,8 @@ int model_directional(MODEL_POINT, const double *sx, const double *su, const dou
 
 int model_discrete(MODEL_POINT, double *z);         /* new values of the discrete variables */
 int model_discrete_start(MODEL_POINT, const double *x_start, double *z); /* their values before the first event */
+int model_first_indicators(double t, const double *u, const double *p, const double *d, const double *m,
+                           const double *x_start, double *g); /* relations at the start values */
 int model_reinit(MODEL_POINT, double *x_new);         /* states after an event */
 int model_samples(const double *p, const double *d, double *s); /* start and interval of each sample */
 int model_assertions(MODEL_POINT, double *a);       /* nonzero where violated */

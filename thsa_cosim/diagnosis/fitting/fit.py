@@ -17,6 +17,8 @@ from thsa_cosim.signals import FloatArray
 #: their own norm: far from the optimum small steps see the solver's events more than the slope.
 RESPONSE, SHARE = 60.0, 0.1
 SMALLEST, LARGEST = 1e-7, 0.3
+#: Information (of unknowns each scaled to 1) below which a combination of them is not determined at all.
+DETERMINED = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +51,30 @@ class Fit:
         prior = self.unknowns.precision * self.unknowns.scale
         return np.asarray(self.jacobian.T @ self.jacobian + np.diag(prior**2))
 
+    @property
+    def inflation(self) -> float:
+        """Mean squared residual in variances of the noise, at least 1: how much less the recordings say for it."""
+        return max(1.0, self.misfit / self.residual.size)
+
+    def covariance(self, inflation: float = 1.0) -> FloatArray:
+        """(n, n) covariance, per scale; infinite on the diagonal of what nothing determines.
+
+        ``inflation`` widens what the recordings say; what the drawing says stays as it is.
+        """
+        prior = self.unknowns.precision * self.unknowns.scale
+        information = self.jacobian.T @ self.jacobian / inflation + np.diag(prior**2)
+        size = np.sqrt(np.diag(information))
+        size[size == 0.0] = 1.0
+        values, vectors = np.linalg.eigh(information / np.outer(size, size))
+        known = values > DETERMINED
+        covariance = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(size, size)
+        open_ = np.sum(vectors[:, ~known] ** 2, axis=1) > 1e-6
+        covariance[open_, open_] = np.inf
+        return np.asarray(covariance)
+
     def stderr(self, inflation: float = 1.0) -> FloatArray:
-        """(n,) standard errors in the unknowns' units; ``inflation`` multiplies the covariance."""
-        covariance = np.linalg.pinv(self.information, hermitian=True)
-        return np.asarray(np.sqrt(np.maximum(np.diag(covariance) * inflation, 0.0)) * self.unknowns.scale)
+        """(n,) standard errors in the unknowns' units, by `covariance`; infinite where nothing determines one."""
+        return np.asarray(np.sqrt(np.diag(self.covariance(inflation))) * self.unknowns.scale)
 
 
 def cost_of(unknowns: Unknowns, vector: FloatArray, residual: FloatArray) -> float:

@@ -163,7 +163,7 @@ class DiagnosisResult:
     before: Errors
     after: Errors
     recordings_before: Errors
-    """Recording → channel → error, of the declared model; ``recordings_after``: of the extended one, if there is one."""
+    """Recording → channel → error, of the declared model; ``recordings_after``: of the extended one, if any."""
     recordings_after: Errors
     declared_before: Mapping[str, Value]
     declared_after: Mapping[str, Value]

@@ -1,6 +1,6 @@
 """The use case: scenario → superset → attribution → closure → verdict."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -100,7 +100,19 @@ def diagnose(
         reason = next(iter(bench.failures), "no run succeeded")
         raise StudyError(f"{scenario.path}: the model with all effects cannot be simulated: {reason}")
     return _Closing(
-        scenario, spec, folder, workers, cluster, trials, unknowns, before, found, bench, say, box
+        scenario,
+        spec,
+        folder,
+        workers,
+        cluster,
+        trials,
+        unknowns,
+        before,
+        found,
+        bench,
+        say,
+        tuple(effects),
+        box,
     ).result()
 
 
@@ -119,6 +131,7 @@ class _Closing:
     found: Attribution
     bench: Bench
     say: Say
+    effects: tuple[str, ...]
     box: BlackBox | None = None
 
     def result(self) -> DiagnosisResult:
@@ -130,6 +143,8 @@ class _Closing:
         wrapper: Path | None = None
         if self.box is not None:
             notes += self.box.notes
+        if not _tested(found):
+            notes.append(_untested(found, self.effects))
         if accepted:
             wider = extended_unknowns(self.unknowns, accepted)
             hint = found.final.at(wider.names)
@@ -250,13 +265,23 @@ def _errors(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
 def _errors_by_recording(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
     found: dict[str, Mapping[str, ChannelError]] = {}
     for part, residual in (("fit", identified.fit.residual), ("validate", identified.validate)):
-        found |= errors_by_recording(tuple(t for t in identified.trials if t.part == part), residual)
+        trials = tuple(t for t in identified.trials if t.part == part)
+        for name, channels in errors_by_recording(trials, residual).items():
+            found[f"{part}/{name}" if name in found else name] = channels
     return found
 
 
 def _tested(found: Attribution) -> int:
     """How many proposals the recordings could have told from nothing."""
     return sum(p.is_testable for r in found.rounds[:1] for p in r.proposals)
+
+
+def _untested(found: Attribution, effects: Iterable[str]) -> str:
+    """Why no effect could be tried."""
+    names = ", ".join(effects)
+    if not any(r.proposals for r in found.rounds):
+        return f"no effect could be tried: the model has no place for {names}"
+    return f"no effect could be tried: nothing in the fit recordings depends on {names}"
 
 
 def _comparisons(before: Identified, after: Identified | None) -> tuple[Comparison, ...]:

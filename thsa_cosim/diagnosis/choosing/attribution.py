@@ -119,7 +119,7 @@ def attribute(
         if reweighed is None:
             return None
         current_held = reweighed
-    accepted, current, current_held, notes = _prune(bench, unknowns, weights, accepted, current, current_held)
+    accepted, current, current_held, notes = prune(bench, unknowns, weights, accepted, current, current_held)
     while accepted and (name := out_of_range(current)):
         notes.append(f"{accepted[-1].candidate.name} was dropped: it drives {name} to the end of its range")
         accepted = accepted[:-1]
@@ -140,7 +140,7 @@ def attribute(
     )
 
 
-def _prune(
+def prune(
     bench: Bench,
     unknowns: Unknowns,
     weights: ChannelWeights,

@@ -194,10 +194,7 @@ def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, 
     diagonal[diagonal <= 0.0] = 1.0
     for _ in range(3):
         dampings = [damping * 10.0**k for k in (0, 2, 4)]
-        trials = []
-        for d in dampings:
-            factor = cho_factor(information + np.diag((d + 1e-12) * diagonal))
-            trials.append(unknowns.clip(state.vector - cho_solve(factor, gradient) * scale))
+        trials = [_bounded(state, information + np.diag((d + 1e-12) * diagonal), gradient) for d in dampings]
         step = (trials[0] - state.vector) / scale
         promised = float(-2.0 * gradient @ step - step @ information @ step)
         if promised < 1e-3:
@@ -211,3 +208,24 @@ def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, 
             return replace(state, vector=trials[best], residual=residual, cost=costs[best]), promised, damping
         damping = dampings[-1] * 100.0
     return None, promised, damping
+
+
+def _bounded(state: Fit, curvature: FloatArray, gradient: FloatArray) -> FloatArray:
+    """(n,) where the quadratic model is least; unknowns that leave their bounds stay there, the others make up for it.
+
+    Clipping alone would leave the others where they only make sense together with what was clipped.
+    """
+    unknowns = state.unknowns
+    step = np.zeros(gradient.size)
+    free = np.ones(gradient.size, dtype=bool)
+    while free.any():
+        pull = gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
+        step[free] = -cho_solve(cho_factor(curvature[np.ix_(free, free)]), pull)
+        wanted = state.vector + step * unknowns.scale
+        held = unknowns.clip(wanted)
+        left = free & (held != wanted)
+        if not left.any():
+            break
+        step[left] = ((held - state.vector) / unknowns.scale)[left]
+        free &= ~left
+    return unknowns.clip(state.vector + step * unknowns.scale)

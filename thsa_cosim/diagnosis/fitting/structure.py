@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import norm, rankdata
 from scipy.stats import t as student
 
+from thsa_cosim.costs.channels import Channel
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.results import ChannelError
 from thsa_cosim.signals import FloatArray
@@ -118,17 +119,21 @@ def block_squares(trials: Sequence[Trial], residual: FloatArray, seconds: float 
     Blocks are long against the correlation of the residuals, so that their scatter says what chance does; shorter
     recordings are cut into no fewer than ``FEWEST``.
     """
-    lasting = sum(max(float(c.time[-1] - c.time[0]) for c in t.case.channels) for t in trials)
-    seconds = min(seconds, lasting / FEWEST)
+    spans = [(min(c.time[0] for c in own), max(c.time[-1] for c in own)) for own in _channels(trials)]
+    seconds = min(seconds, sum(float(end - begin) for begin, end in spans) / FEWEST)
     sums: list[FloatArray] = []
-    for trial, squares in zip(trials, per_trial(trials, residual**2), strict=True):
-        blocks = [
-            np.bincount(np.floor((c.time - c.time[0]) / seconds).astype(int), weights=squares[c.name])
-            for c in trial.case.channels
-        ]
-        longest = max(b.size for b in blocks)
-        sums.append(np.sum([np.pad(b, (0, longest - b.size)) for b in blocks], axis=0))
+    for trial, (begin, end), squares in zip(trials, spans, per_trial(trials, residual**2), strict=True):
+        count = max(1, round(float(end - begin) / seconds))
+        own = np.zeros(count)
+        for channel in trial.case.channels:
+            block = np.floor((channel.time - begin) / (end - begin) * count).astype(int)
+            np.add.at(own, np.minimum(block, count - 1), squares[channel.name])
+        sums.append(own)
     return np.concatenate(sums)
+
+
+def _channels(trials: Sequence[Trial]) -> list[Sequence[Channel]]:
+    return [trial.case.channels for trial in trials]
 
 
 def consistency(gains: FloatArray) -> float:

@@ -17,7 +17,7 @@ from thsa_cosim.search.differential_evolution import (
     Generation,
     evolve,
 )
-from thsa_cosim.search.polish import PolishResult, PolishSettings, central_jacobian, polish
+from thsa_cosim.search.polish import PolishResult, PolishSettings, polish
 from thsa_cosim.search.profile import CHI2_95, Profile, profile
 from thsa_cosim.search.uncertainty import (
     Uncertainty,
@@ -36,7 +36,6 @@ __all__ = [
     "PolishSettings",
     "Profile",
     "Uncertainty",
-    "central_jacobian",
     "estimate_uncertainty",
     "evolve",
     "long_run_covariance",

@@ -5,11 +5,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from thsa_cosim.diagnosis.structure import ChannelError
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.signals import Signals
 
 Verdict = Literal["missing-effect", "no-missing-effect", "unexplained-structure"]
+
+
+@dataclass(frozen=True)
+class ChannelError:
+    """A channel's error over some recordings, in its unit: ``rmse``, ``noise`` and the ``structure`` in it (rms).
+
+    ``significance``: the structure's square in standard deviations of what white noise would show.
+    """
+
+    rmse: float
+    noise: float
+    structure: float
+    significance: float
+    samples: int
 
 
 @dataclass(frozen=True)

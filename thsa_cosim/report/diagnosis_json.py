@@ -8,8 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from thsa_cosim.diagnosis.results import DiagnosisResult, EmpiricalLaw, Errors, Value
-from thsa_cosim.diagnosis.structure import ChannelError
+from thsa_cosim.diagnosis.results import ChannelError, DiagnosisResult, EmpiricalLaw, Errors, Value
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.report.result_json import write_json
 from thsa_cosim.report.signal_files import write_signals

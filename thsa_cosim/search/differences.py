@@ -42,7 +42,7 @@ class Box:
 
 @dataclass(frozen=True)
 class DifferenceSettings:
-    """A step moves the residuals by ``response`` in all (their norm), or by ``share`` of their own norm if that is more.
+    """A step moves the residuals' norm by ``response``, or by ``share`` of their own norm if that is more.
 
     In units of noise, 10 is ten conditional standard errors: far above a solver's tolerance, and still small against
     the curvature of anything that the data determine. Far from the minimum small steps see a solver's events more
@@ -88,7 +88,7 @@ def difference_columns(
     found, steps = np.zeros((centre.size, len(columns))), steps.copy()
     aim = max(settings.response, settings.share * float(np.linalg.norm(centre)))
     open_ = list(range(len(columns)))
-    for turn in range(settings.repeats + 1):
+    for _ in range(settings.repeats + 1):
         pairs = [_pair(x, columns[k], steps, box, settings.central) for k in open_]
         results = iter((yield np.array([side for pair in pairs for side in pair])))
         again = []
@@ -98,7 +98,9 @@ def difference_columns(
             norm = float(np.linalg.norm(column)) * steps[j]
             if norm == 0.0:
                 # Failed, or no response at all: a smaller step may be possible, a larger one may show something.
-                steps[j] = np.clip(steps[j] * (0.1 if column is _FAILED else 10.0), settings.smallest, settings.largest)
+                steps[j] = np.clip(
+                    steps[j] * (0.1 if column is _FAILED else 10.0), settings.smallest, settings.largest
+                )
                 again.append(k)
                 continue
             found[:, k] = column

@@ -90,6 +90,13 @@ def least_squares(
     return (yield from search.run(box.clip(start), residual, jacobian, steps))
 
 
+def smooth_cost(residual: FloatArray, error: str) -> float:
+    """Σ f(r) with the smooth stand-in of f; infinite where residuals (N,) are, or are absurdly large."""
+    with np.errstate(over="ignore"):
+        total = float(np.sum(ERRORS[error].smooth(residual)))
+    return total if np.isfinite(total) else float("inf")
+
+
 class _Search:
     """One descent and where it stands."""
 
@@ -111,7 +118,7 @@ class _Search:
         if residual is None:
             residual = (yield x[None, :])[0]
             self.evaluations += 1
-            if residual is None or not np.isfinite(residual).all():
+            if residual is None or not np.isfinite(smooth_cost(residual, self.settings.error)):
                 return None
         n, settings = x.size, self.settings
         steps = np.full(n, settings.differences.first) if steps is None else steps
@@ -160,7 +167,7 @@ class _Search:
 
     def cost(self, x: FloatArray, residual: FloatArray) -> float:
         """Σ f(r), with the smooth stand-in of f, and the prior's squares."""
-        total = float(np.sum(self.function.smooth(residual)))
+        total = smooth_cost(residual, self.settings.error)
         if self.prior is not None:
             total += float(np.sum(((x - self.prior.mean) * self.prior.precision) ** 2))
         return total
@@ -215,7 +222,9 @@ class _Search:
             if not out.any():
                 break
             # The one that is furthest out, relative to its way, goes onto its bound first.
-            beyond = np.where(out, np.maximum(step - high, low - step) / np.maximum(np.abs(step), 1e-300), 0.0)
+            beyond = np.where(
+                out, np.maximum(step - high, low - step) / np.maximum(np.abs(step), 1e-300), 0.0
+            )
             j = int(np.argmax(beyond))
             step[j], free[j] = np.clip(step[j], low[j], high[j]), False
         return np.clip(step, low, high)
@@ -232,10 +241,7 @@ class _Search:
             trials = self.box.clip(x + np.array(moves) * self.box.scale)
             found = yield trials
             self.evaluations += len(trials)
-            costs = [
-                self.cost(v, r) if r is not None and np.isfinite(r).all() else np.inf
-                for v, r in zip(trials, found, strict=True)
-            ]
+            costs = [self.cost(v, r) if r is not None else np.inf for v, r in zip(trials, found, strict=True)]
             best = int(np.argmin(costs))
             residual = found[best]
             promised = _decrease(moves[best], gradient, information)

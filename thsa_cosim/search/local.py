@@ -9,12 +9,13 @@ neither begin where nothing can be simulated nor all at the same place.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from thsa_cosim.costs.identification import ERRORS
 from thsa_cosim.search.differences import Asking, Box, FloatArray, Residual, Residuals
-from thsa_cosim.search.least_squares import LeastSquaresSettings, Minimum, least_squares
+from thsa_cosim.search.least_squares import LeastSquaresSettings, Minimum, least_squares, smooth_cost
 
 #: Two searches agree when their ends are less than so many standard errors apart, and so is the rise of the cost.
 AGREE = 1.0
@@ -34,7 +35,7 @@ class LocalSettings:
     needed: int = 4
     hand: int = 4
     seed: int = 1
-    least_squares: LeastSquaresSettings = LeastSquaresSettings()
+    least_squares: LeastSquaresSettings = field(default_factory=LeastSquaresSettings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +64,7 @@ class LocalResult:
     """The best minimum, and every search that was started; ``settled``: enough of them agree."""
 
     minimum: Minimum
+    minima: tuple[Minimum, ...]
     searches: tuple[LocalSearch, ...]
     settled: bool
     evaluations: int
@@ -71,6 +73,22 @@ class LocalResult:
     def agreed(self) -> int:
         """Searches that ended in the best minimum."""
         return sum(search.agrees for search in self.searches)
+
+    def with_minimum(self, other: Minimum, error: str) -> "LocalResult":
+        """The same after a global search that ended in ``other``: the better of both is what has to be agreed with."""
+        minima = [*self.minima, other]
+        best = min(minima, key=lambda minimum: minimum.cost)
+        searches = tuple(
+            replace(search, agrees=same_minimum(minimum, best, error))
+            for search, minimum in zip(self.searches, self.minima, strict=True)
+        )
+        return replace(self, minimum=best, searches=searches)
+
+
+def agreement(searches: Sequence[LocalSearch]) -> str:
+    """How many of the searches ended in the best minimum, as a sentence without its full stop."""
+    agreed = sum(search.agrees for search in searches)
+    return f"{agreed} of {len(searches)} local searches from different starts agree"
 
 
 def search_locally(
@@ -86,12 +104,14 @@ def search_locally(
     many searches are under way whenever some are started.
     """
     rng = np.random.default_rng([settings.seed, 2])
-    found: list[tuple[FloatArray, Minimum]] = []
+    starts: list[FloatArray] = []
+    minima: list[Minimum] = []
+    searches: tuple[LocalSearch, ...] = ()
     evaluations = 0
     for count in (settings.starts, settings.most - settings.starts):
         if on_searches is not None:
-            on_searches(len(found) + count)
-        given = start if not found and evaluations == 0 else None
+            on_searches(count)
+        given = start if not starts else None
         vectors, residuals = _starts(evaluate, rng, dimension, count, settings, given)
         evaluations += count * settings.hand
         tasks = [
@@ -99,19 +119,19 @@ def search_locally(
             for v, r in zip(vectors, residuals, strict=True)
         ]
         for vector, minimum in zip(vectors, together(tasks, evaluate), strict=True):
-            if minimum is not None:
-                found.append((vector, minimum))
-                evaluations += minimum.evaluations
-        searches = _compare(found, settings)
+            assert minimum is not None, "the residuals of every start are known"
+            starts.append(vector)
+            minima.append(minimum)
+            evaluations += minimum.evaluations
+        if not minima:
+            return None  # nothing can be simulated but, perhaps, a small part: not a task for local searches
+        searches = _compare(starts, minima, settings.least_squares.error)
         agreed = sum(search.agrees for search in searches)
         if agreed == len(searches) >= settings.starts:
             break
-    if not found:
-        return None
-    best = min((minimum for _, minimum in found), key=lambda minimum: minimum.cost)
-    all_agree = agreed == len(searches) >= settings.starts
-    settled = all_agree or agreed >= settings.needed
-    return LocalResult(best, tuple(searches), settled, evaluations)
+    best = min(minima, key=lambda minimum: minimum.cost)
+    settled = agreed >= settings.needed or agreed == len(searches) >= settings.starts
+    return LocalResult(best, tuple(minima), searches, settled, evaluations)
 
 
 def together(tasks: Sequence[Asking[Minimum | None]], evaluate: Residuals) -> list[Minimum | None]:
@@ -151,16 +171,16 @@ def _starts(
     hands = (slices + rng.random(slices.shape)) / size
     if given is not None:
         hands[: settings.hand] = np.clip(given, 0.0, 1.0)
-    residuals = list(evaluate(hands if given is None else hands[settings.hand - 1 :]))
-    if given is not None:
-        residuals = [None] * (settings.hand - 1) + residuals
+    # A start that is given needs no hand to choose from.
+    left_out = 0 if given is None else settings.hand - 1
+    residuals: list[Residual] = [*[None] * left_out, *evaluate(hands[left_out:])]
     vectors, known = [], []
     box = Box.unit(dimension)
     for first in range(0, size, settings.hand):
         usable = [
-            (_cost(r, settings), k)
+            (cost, k)
             for k, r in enumerate(residuals[first : first + settings.hand], start=first)
-            if r is not None and np.isfinite(r).all()
+            if r is not None and np.isfinite(cost := smooth_cost(r, settings.least_squares.error))
         ]
         if usable:
             k = min(usable)[1]
@@ -171,30 +191,17 @@ def _starts(
     return vectors, known
 
 
-def _cost(residual: FloatArray, settings: LocalSettings) -> float:
-    from thsa_cosim.costs.identification import ERRORS
-
-    return float(np.sum(ERRORS[settings.least_squares.error].smooth(residual)))
-
-
-def _compare(found: Sequence[tuple[FloatArray, Minimum]], settings: LocalSettings) -> list[LocalSearch]:
+def _compare(starts: Sequence[FloatArray], minima: Sequence[Minimum], error: str) -> tuple[LocalSearch, ...]:
     """The searches, and which of them ended in the best minimum."""
-    searches = [
-        LocalSearch(start, m.x, m.history, m.evaluations, m.converged, m.reason) for start, m in found
-    ]
-    if not found:
-        return searches
-    best = min((m for _, m in found), key=lambda m: m.cost)
-    return [
-        replace(search, agrees=same_minimum(m, best, settings.least_squares.error))
-        for search, (_, m) in zip(searches, found, strict=True)
-    ]
+    best = min(minima, key=lambda minimum: minimum.cost)
+    return tuple(
+        LocalSearch(start, m.x, m.history, m.evaluations, m.converged, m.reason, same_minimum(m, best, error))
+        for start, m in zip(starts, minima, strict=True)
+    )
 
 
 def same_minimum(other: Minimum, best: Minimum, error: str) -> bool:
     """Whether a search ended within a standard error of the best end, at no higher cost than that explains."""
-    from thsa_cosim.costs.identification import ERRORS
-
     function = ERRORS[error]
     slope = function.slope(best.residual)
     unit = float(np.mean(function.psi(best.residual) ** 2)) / max(float(np.mean(slope)), 1e-12)

@@ -67,9 +67,7 @@ def polish(evaluate: Residuals, start: FloatArray, settings: PolishSettings) -> 
     box = Box.unit(start.size)
     found = answer(least_squares(start, box, settings.least_squares), evaluate)
     if found is None:
-        return PolishResult(
-            start, None, None, None, 1, False, "the vector to polish could not be simulated"
-        )
+        return PolishResult(start, None, None, None, 1, False, "the vector to polish could not be simulated")
     if not settings.final_jacobian:
         return PolishResult(
             found.x, found.residual, None, None, found.evaluations, found.converged, found.reason

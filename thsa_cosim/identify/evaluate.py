@@ -64,7 +64,7 @@ class Reply:
 def planned_vectors(search: SearchSpec, dimension: int) -> int:
     """Return how many vectors a search over ``dimension`` parameters may take.
 
-    Local searches are expected to agree, each after nine steps with one-sided differences; an evolution to take
+    Local searches are expected to agree, each after seven steps with one-sided differences; an evolution to take
     all its generations, its polish six steps. Central differences, twice, end both.
     """
     end = 2 + 4 * dimension
@@ -72,7 +72,7 @@ def planned_vectors(search: SearchSpec, dimension: int) -> int:
         return evolved_vectors(search) + 2
     if search.method == "local-first":
         settings = LocalSettings()
-        return settings.starts * (settings.hand + 9 * (dimension + 2)) + end
+        return settings.starts * (settings.hand + 7 * (dimension + 2)) + end
     return evolved_vectors(search) + 6 * (dimension + 2) + end
 
 

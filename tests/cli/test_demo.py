@@ -7,7 +7,7 @@ import pytest
 
 from thsa_cosim import cli
 from thsa_cosim.cli import demo as demo_module
-from thsa_cosim.report.index_page import Entry, write_index
+from thsa_cosim.report.page.index import Entry, write_index
 
 ROOT = Path(__file__).parents[2]
 
@@ -90,14 +90,17 @@ def test_a_step_that_fails_ends_the_demo_with_its_name(
     assert "The step 'Check what the FMU can be trusted with' failed (exit code 2)" in err
 
 
-def test_elsewhere_the_demo_asks_for_a_checkout(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_in_an_empty_folder_the_demo_brings_its_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran: list[tuple[str, ...]] = []
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(demo_module, "_NEEDED", ("no/such/file",))
-    assert cli.run_command(["demo"]) == 2
-    assert "run it in a checkout of the repository" in capsys.readouterr().err
-    assert not (tmp_path / "demo").exists()
+    monkeypatch.setattr(demo_module, "_run", lambda step: ran.append(step.words))
+    for name in ("_checked", "_identified", "_tuned", "_diagnosed"):
+        monkeypatch.setattr(demo_module, name, lambda _: ["<done>"])
+    monkeypatch.setattr(demo_module, "_EXPORTER", ("no_such_package",))
+    assert cli.run_command(["demo", "-o", "out"]) == 0
+    paths = [Path(word) for words in ran for word in words if "scenarios" in word or "fmus" in word]
+    assert len(paths) >= 7
+    assert all(path.is_relative_to("out") and path.is_file() for path in paths)
 
 
 def test_an_index_links_only_pages_that_exist(tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ import pytest
 from thsa_cosim import cli
 from thsa_cosim.export import export_fmu
 from thsa_cosim.fmu import Plant
+from thsa_cosim.scenario import load_scenario
+from thsa_cosim.study import open_study, study_identity
 
 ROOT = Path(__file__).parents[2]
 DRIVEN = ROOT / "scenarios" / "driven.toml"
@@ -74,6 +76,28 @@ def test_bad_input_is_one_sentence_and_exit_code_2(
     assert len(sentences) == 1
     assert says in sentences[0]
     assert captured.out == ""
+
+
+CHANGED = {
+    "effects": ('effects = ["windage", "stribeck"]', 'effects = ["stribeck"]', "diagnose.effects"),
+    "most": ("most = 2", "most = 1", "diagnose.most = 2; this one has diagnose.most = 1"),
+    "spread": ("spread = 0.05", "spread = 0.2", "diagnose.spread = 0.05; this one has diagnose.spread = 0.2"),
+    "empirical": ("empirical = true", "empirical = false", "diagnose.empirical = true"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "says"), CHANGED.values(), ids=CHANGED)
+def test_a_finished_folder_does_not_answer_another_question(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, says: str
+):
+    asked = '[diagnose]\neffects = ["windage", "stribeck"]\nmost = 2\nspread = 0.05\nempirical = true\n'
+    study = tmp_path / "study"
+    first = scenario(tmp_path, 2000, **{"[diagnose]\n": asked, "spread = 0.1": ""})
+    open_study(study, study_identity(load_scenario(first)))
+    (study / "result.json").write_text('{"kind": "diagnose", "status": "complete"}', encoding="utf-8")
+    first.write_text(first.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+    assert cli.run_command(["diagnose", str(first), "-o", str(study)]) == 2
+    assert says in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -208,7 +208,11 @@ def test_another_seed_or_scenario_is_refused_in_the_same_folder(study, here: Her
     held_out = ROOT / "scenarios" / "recordings" / "motor_m10.parquet"
     refused = here("identify", other, "--validate", held_out, "-o", folder)
     assert refused.returncode == 2
-    assert "holds a study of another scenario; choose another folder with -o" in refused.stderr
+    assert (
+        "holds a study with parameters[R_s].upper = 5.0; this one has parameters[R_s].upper = 4.0"
+        in refused.stderr
+    )
+    assert "choose another folder with -o" in refused.stderr
 
 
 def test_without_current_nor_speed_the_friction_is_not_determined(here: Here, tmp_path: Path) -> None:

@@ -16,7 +16,6 @@ from thsa_cosim.identify.interleave import interleave
 from thsa_cosim.identify.over_temperature import fit_laws, values_at
 from thsa_cosim.identify.parameter_set import law_values, parameter_set
 from thsa_cosim.identify.results import ChannelError, Comparison, Estimate, PointResult
-from thsa_cosim.identify.study import MARKER, open_study
 from thsa_cosim.laws import published_law
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.report.parameter_files import modelica_record
@@ -198,42 +197,6 @@ def test_values_come_from_the_own_point_or_else_from_the_laws() -> None:
         values_at(20.0, ["R"], POINTS, {}, 1.0)
     with pytest.raises(InputError, match="no temperature"):
         values_at(None, ["R"], POINTS, laws, 1.0)
-
-
-IDENTITY = {"kind": "identify", "scenario": "a", "fmu": "b", "recordings": {"fit": ["c"]}, "seed": 1}
-
-
-def test_study_folder(tmp_path: Path) -> None:
-    folder = tmp_path / "deep" / "study"
-    assert open_study(folder, IDENTITY) is False
-    assert open_study(folder, IDENTITY) is True
-    for key, value, words in [
-        ("seed", 2, "a study with another seed"),
-        ("fmu", "x", "a study of another FMU"),
-        ("scenario", "x", "a study of another scenario"),
-        ("recordings", {"fit": ["d"]}, "a study of other recordings"),
-        ("kind", "tune", "another kind of study"),
-    ]:
-        with pytest.raises(InputError, match=f"holds {words}; choose another folder with -o"):
-            open_study(folder, {**IDENTITY, key: value})
-
-
-def test_a_folder_that_is_no_study_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(InputError, match="exists and is no study folder"):
-        open_study(tmp_path, IDENTITY)
-    assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
-    with pytest.raises(InputError, match="is no study folder"):
-        open_study(tmp_path / "thesis.tex", IDENTITY)
-    with pytest.raises(InputError, match="cannot be used"):
-        open_study(tmp_path / "thesis.tex" / "below", IDENTITY)
-
-
-@pytest.mark.parametrize("content", ["", "[1]", "{"])
-def test_a_damaged_marker_is_named(tmp_path: Path, content: str) -> None:
-    (tmp_path / MARKER).write_text(content)
-    with pytest.raises(InputError, match=r"study\.json is damaged"):
-        open_study(tmp_path, IDENTITY)
 
 
 def description(*names: str) -> FmuDescription:

@@ -5,7 +5,7 @@ import io
 from report_studies import diagnose_result
 from rich.console import Console
 
-from thsa_cosim.report.diagnosis_tables import print_diagnosis
+from thsa_cosim.report.diagnose.tables import print_diagnosis
 
 
 def printed(**changes: object) -> str:

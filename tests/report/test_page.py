@@ -10,8 +10,8 @@ import pytest
 import report_studies as studies
 
 from thsa_cosim.batch import Journal
-from thsa_cosim.identify import open_study
 from thsa_cosim.report.page import write_page
+from thsa_cosim.study import open_study
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = (

@@ -19,15 +19,15 @@ from hypothesis.extra.numpy import arrays
 from thsa_cosim import cli
 from thsa_cosim.batch import Journal, read_journal
 from thsa_cosim.errors import InputError
-from thsa_cosim.identify import open_study
+from thsa_cosim.report.folder import read_study
 from thsa_cosim.report.page import PAGE, write_page
-from thsa_cosim.report.page.chart import envelope, packed, plain
-from thsa_cosim.report.page.folder import read_study
-from thsa_cosim.report.page.populations import evolutions
-from thsa_cosim.report.page.text import degrees, listing, plus_minus
+from thsa_cosim.report.parts.chart import envelope, packed, plain
+from thsa_cosim.report.parts.populations import evolutions
+from thsa_cosim.report.parts.text import degrees, listing, plus_minus
 from thsa_cosim.report.signal_files import read_signals, signal_units, write_signals
 from thsa_cosim.search import EvolutionSettings, evolve
 from thsa_cosim.signals import Signals
+from thsa_cosim.study import open_study
 
 ROOT = Path(__file__).parents[2]
 LOCAL_FIRST, EVOLUTION = 'method = "local-first"', 'method = "differential-evolution"'

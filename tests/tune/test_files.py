@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thsa_cosim.report.schedule_files import identifier, write_schedule
+from thsa_cosim.report.tune.schedule_files import identifier, write_schedule
 from thsa_cosim.tune import GainSchedule
 
 

@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from thsa_cosim.laws import Law
-from thsa_cosim.report.plots import MEASURED, PUBLISHED, RESIDUAL, SIMULATED
+from thsa_cosim.report.identify.plots import MEASURED, PUBLISHED, RESIDUAL, SIMULATED
 from thsa_cosim.report.signal_files import SignalFile
 
 if TYPE_CHECKING:

@@ -10,7 +10,10 @@ from thsa_cosim.cli.options import PATH
 @click.command()
 @click.argument("model")
 @click.option(
-    "--package", type=PATH, default=Path("modelica/THSA"), show_default=True, help="Folder of the package."
+    "--package",
+    type=PATH,
+    default=None,
+    help="Folder of its package; default: modelica/THSA, or the shipped one.",
 )
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", show_default=True, help="FMI version.")
 @click.option("-o", "--output", type=PATH, default=None, help="The FMU to write; default MODEL.fmu.")
@@ -23,7 +26,7 @@ from thsa_cosim.cli.options import PATH
 )
 @click.option("--platforms", default=None, help="Comma-separated FMI platforms, for example win64,linux64.")
 def export(
-    model: str, package: Path, fmi: str, output: Path | None, compiler: str, platforms: str | None
+    model: str, package: Path | None, fmi: str, output: Path | None, compiler: str, platforms: str | None
 ) -> None:
     """Export the Modelica class MODEL (or a .mo file's class) as an FMU."""
     from thsa_cosim.export import export_fmu

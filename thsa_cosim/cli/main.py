@@ -15,6 +15,7 @@ from thsa_cosim.cli.check import check
 from thsa_cosim.cli.completion import completion
 from thsa_cosim.cli.demo import demo
 from thsa_cosim.cli.diagnose import diagnose
+from thsa_cosim.cli.example import example
 from thsa_cosim.cli.export import export
 from thsa_cosim.cli.identify import identify
 from thsa_cosim.cli.init import init
@@ -35,6 +36,7 @@ COMMANDS: tuple[click.Command, ...] = (
     diagnose,
     report,
     demo,
+    example,
     completion,
 )
 

@@ -33,9 +33,9 @@ from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import ChannelError, Comparison, DiagnosisResult, EmpiricalLaw
 from thsa_cosim.errors import StudyError
 from thsa_cosim.identify import Comparison as Compared
-from thsa_cosim.identify import ForceBalance, force_balance, open_study, study_identity
-from thsa_cosim.identify.study import describe
+from thsa_cosim.identify import ForceBalance, force_balance
 from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
+from thsa_cosim.study import describe, open_study, study_identity
 
 #: The folder of the superset inside a study.
 WORK = "superset"

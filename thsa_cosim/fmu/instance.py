@@ -15,6 +15,7 @@ from thsa_cosim.errors import ParameterError
 from thsa_cosim.fmu.description import FmuDescription, Variable
 from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.native import Library, Messages, MessageSink, failure, library_path, load_library
+from thsa_cosim.fmu.point import InstancePoint, Point
 from thsa_cosim.signals import FloatArray
 
 
@@ -203,3 +204,25 @@ class Instance(ABC):
     def vector(self, name: str, values: FloatArray) -> None:
         """Call a function that reads or writes a vector of Reals, e.g. GetContinuousStates."""
         self.call(name, (ctypes.c_void_p, values.ctypes.data), (ctypes.c_size_t, len(values)))
+
+    def point(self, input_channels: Sequence[Channel]) -> Point:
+        """Return the instance as the integrator sees it."""
+        return InstancePoint(self, input_channels)
+
+    @property
+    def has_jacobian(self) -> bool:
+        """Whether ``jacobian`` can be called."""
+        description = self.description
+        return bool(
+            description.states
+            and description.capabilities.get("providesDirectionalDerivative")
+            and len(description.state_references) == description.states
+        )
+
+    def jacobian(self, out: FloatArray) -> None:
+        """Write df/dx (n, n) at the present point into ``out``, column by column."""
+        references = np.array(self.description.state_references, dtype=np.uint32)
+        column = np.empty(len(references))
+        for j in range(len(references)):
+            self.directional_derivative(references[:, 1], references[j : j + 1, 0], column)
+            out[:, j] = column

@@ -10,6 +10,7 @@ from thsa_cosim.errors import ScenarioError
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
+from thsa_cosim.scenario.schema import CommonTable
 from thsa_cosim.search.strategies import SearchMethod, Strategy
 from thsa_cosim.signals import Signals
 
@@ -164,11 +165,13 @@ class Scenario:
 
     ``points`` groups the fit recordings (and the validate recordings of the same temperature); ``validate``
     holds every recording that no fit may touch. ``inputs`` drive the FMU, ``measured`` are the outputs that the
-    recordings hold, ``outputs`` those to be simulated. ``fixed`` are FMU start values (FMU units).
+    recordings hold, ``outputs`` those to be simulated. ``fixed`` are FMU start values (FMU units). ``table`` is the
+    file as it was written, checked, with its defaults.
     """
 
     kind: str
     path: Path
+    table: CommonTable
     title: str
     seed: int
     fmu: FmuDescription

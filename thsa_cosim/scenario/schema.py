@@ -303,8 +303,8 @@ class DiagnoseOptionsTable(Table):
     model: Name | None = None
     """Modelica class with effect slots, such as ``"THSA.Actuator"``; left out: the FMU is a black box, and
     ``[diagnose.blackbox]`` names its signals."""
-    package: Name = "../modelica/THSA"
-    """Folder of its package, relative to the scenario."""
+    package: Name | None = None
+    """Folder of its package, relative to the scenario; left out: ``../modelica/THSA``, or the one that is shipped."""
     effects: list[Name] = Field(default_factory=list)
     """Names from the catalogue to try; none: all."""
     catalogue: Name | None = None

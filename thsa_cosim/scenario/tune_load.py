@@ -98,6 +98,7 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
     requirements = tuple(_requirement(k, r, table, command, fmu) for k, r in enumerate(table.requirements))
     return TuneScenario(
         path=path,
+        table=table,
         title=table.title or path.stem,
         seed=table.seed if seed is None else seed,
         fmu=fmu,

@@ -21,6 +21,7 @@ from thsa_cosim.fmu import read_description
 from thsa_cosim.identify.problem import Case
 from thsa_cosim.scenario import Scenario, SimulationSpec, open_runner
 from thsa_cosim.signals import Signals
+from thsa_cosim.study import export_digest, is_made_from, note_made_from
 
 #: What an FMU for this machine alone is compiled for.
 _HERE = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}
@@ -64,16 +65,18 @@ def open_superset(
 def build_superset(
     model: str, package: Path, effects: Iterable[Effect], folder: Path
 ) -> tuple[Path, tuple[Slot, ...], tuple[Effect, ...]]:
-    """Export the superset into ``folder`` (kept there: the same sources give it again without exporting)."""
+    """Export the superset into ``folder``, where it is kept until anything that it is made from changes."""
     slots, effects = find_slots(model, package), tuple(effects)
     candidates = candidates_of(effects, slots, {})
     name = qualified(model, package).replace(".", "_") + "_superset"
     source = extended_class(name, qualified(model, package), candidates, description="All effects, neutral")
-    file = folder / f"{name}.mo"
     fmu = folder / f"{name}.fmu"
-    if not (fmu.is_file() and file.is_file() and file.read_text(encoding="utf-8") == source):
+    platforms = this_platform()
+    made_from = export_digest(source, package, platforms)
+    if not is_made_from(fmu, made_from):
         file = write_extended(folder, name, source)
-        export_fmu(str(file), package=package, output=fmu, platforms=this_platform())
+        export_fmu(str(file), package=package, output=fmu, platforms=platforms)
+        note_made_from(fmu, made_from)
     return fmu, slots, effects
 
 

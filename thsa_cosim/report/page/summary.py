@@ -1,16 +1,16 @@
 """The page's first section: what was asked, what came out, how sure that is."""
 
-from thsa_cosim.report.page.comparison import MET, MISSED, noise_ratio, ratio_mark, role_text
-from thsa_cosim.report.page.content import Block, Cell, Column, Facts, Section, Table, Text
-from thsa_cosim.report.page.diagnosis import held_out, verdict
-from thsa_cosim.report.page.failures import evaluations, failed
-from thsa_cosim.report.page.folder import Json, Part, Study
-from thsa_cosim.report.page.gains import term_label
-from thsa_cosim.report.page.text import (
+from thsa_cosim.report.diagnose.verdict import held_out, verdict
+from thsa_cosim.report.folder import Json, Part, Study
+from thsa_cosim.report.parts.comparison import MET, MISSED, noise_ratio, ratio_mark, role_text
+from thsa_cosim.report.parts.content import Block, Cell, Column, Facts, Section, Table, Text
+from thsa_cosim.report.parts.failures import evaluations, failed
+from thsa_cosim.report.parts.text import (
     DASH,
     count,
     degrees,
     listing,
+    number,
     number_cell,
     percent,
     plus_minus,
@@ -19,7 +19,7 @@ from thsa_cosim.report.page.text import (
     significant_cell,
     text_cell,
 )
-from thsa_cosim.report.tables import number
+from thsa_cosim.report.tune.gains import term_label
 
 _STATUS = {
     "running": "The study is running; this is how far it is. The same command writes the page anew.",

@@ -11,6 +11,7 @@ import pandas as pd
 from thsa_cosim.diagnosis.results import ChannelError, DiagnosisResult, EmpiricalLaw, Errors, Value
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.report.files import RESULT, write_json
+from thsa_cosim.report.page.pictures import write_pictures
 from thsa_cosim.report.signal_files import write_signals
 
 
@@ -117,7 +118,7 @@ def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:
         files.append(write_signals(folder, c.part, c.name, variants))
     files += [p for p in (result.model, result.extended_fmu, result.wrapper) if p is not None]
     write_json(folder / RESULT, content)
-    return [*files, folder / RESULT]
+    return [*files, folder / RESULT, *write_pictures(folder)]
 
 
 def _law(law: EmpiricalLaw) -> dict[str, Any]:

@@ -137,7 +137,7 @@ class _Closing:
     def result(self) -> DiagnosisResult:
         """Identify the extended model on its own FMU as the declared one was, and judge both."""
         scenario, found, before = self.scenario, self.found, self._declared()
-        accepted, notes, after = found.accepted, list(found.notes), before
+        accepted, notes, after = found.accepted, [*self.bench.notes, *found.notes], before
         model: Path | None = None
         extended: Path | None = None
         wrapper: Path | None = None

@@ -58,6 +58,7 @@ class Drive:
     candidates: tuple[Candidate, ...]
     measured: Mapping[str, Mapping[str, np.ndarray]]
     ran: list[Job] = field(default_factory=list)
+    notes: tuple[str, ...] = ()
 
     def outputs(self, values: Mapping[str, float], part: str) -> dict[str, np.ndarray]:
         own = motion(part)

@@ -40,6 +40,7 @@ class Formula:
     model: Model
     fails: Callable[[Mapping[str, float]], bool] = lambda values: False
     jobs: list[Job] = field(default_factory=list)
+    notes: tuple[str, ...] = ()
 
     def run(self, jobs: Sequence[Job], on_outcome: object = None) -> list[Outcome]:
         self.jobs += jobs

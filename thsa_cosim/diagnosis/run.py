@@ -16,6 +16,7 @@ from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, values_of
+from thsa_cosim.diagnosis.choosing.orders import Machine, machine_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
@@ -91,8 +92,10 @@ def diagnose(
     )
     with open_runner(scenario.simulation, [t.experiment for t in driven], workers, cluster) as runner:
         bench = Bench(runner, driven)
-        scan = wave_number_finder(bench, tested.slots, tested.signals_at)
         start = before.fit.vector
+        at_start = {t.case.name: unknowns.assignments(start, t.group) for t in driven if t.part == "fit"}
+        machine = machine_of(tested.slots, tested.signals_at(at_start))
+        scan = wave_number_finder(bench, tested.slots, tested.signals_at, machine)
         found = attribute(
             bench, unknowns, tested.candidates, scan, start=start, seed=scenario.seed, most=spec.most, say=say
         )
@@ -112,6 +115,7 @@ def diagnose(
         bench,
         say,
         tuple(effects),
+        machine,
         box,
     ).result()
 
@@ -132,6 +136,7 @@ class _Closing:
     bench: Bench
     say: Say
     effects: tuple[str, ...]
+    machine: Machine
     box: BlackBox | None = None
 
     def result(self) -> DiagnosisResult:
@@ -188,7 +193,7 @@ class _Closing:
             fmu=scenario.fmu.path,
             fmu_sha256=scenario.fmu.sha256,
             verdict=verdict,
-            effects=found_effects(found, after.fit),
+            effects=found_effects(found, after.fit, self.machine),
             before=_errors(before),
             after=_errors(after) if changed else {"fit": {}, "validate": {}},
             recordings_before=_errors_by_recording(before),

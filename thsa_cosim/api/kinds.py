@@ -123,7 +123,7 @@ class DiagnoseStudy(Study):
 
     @property
     def verdict(self) -> str:
-        """``missing-effect``, ``no-missing-effect`` or ``unexplained-structure``."""
+        """``missing-effect``, ``no-missing-effect``, ``unexplained-structure`` or ``not-tested``."""
         return str(self.result["verdict"])
 
     @property

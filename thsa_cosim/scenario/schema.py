@@ -189,6 +189,10 @@ class SimulationTable(Table):
 
     interface: Literal["co-simulation", "model-exchange"] | None = None
     """Left out: Co-Simulation if the FMU has it."""
+    inputs: Literal["hold", "mean", "derivative", "intermediate"] | None = None
+    """How inputs that run linearly reach a Co-Simulation FMU within a step: held at its begin or at its mean, by input
+    derivatives (FMI 2.0), by intermediate update (FMI 3.0). Left out: the best one in a trial on the first recording,
+    which may be Model Exchange if ``interface`` is left out too."""
     tolerance: Annotated[float, Field(gt=0, lt=1)] | None = None
     """Relative tolerance handed to the FMU (or to CVODE); left out: the FMU's own."""
     step: Positive | None = None

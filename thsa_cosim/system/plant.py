@@ -1,6 +1,8 @@
 """One way in for FMUs and systems of FMUs."""
 
+import shutil
 import tempfile
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from thsa_cosim.fmu.instance import Instance
 from thsa_cosim.fmu.plant import Plant
 from thsa_cosim.system.description import SystemDescription, describe_system
 from thsa_cosim.system.instance import SystemInstance
-from thsa_cosim.system.ssp import component_fmus, is_ssp, read_ssp
+from thsa_cosim.system.ssp import ROOT, component_fmus, is_ssp, read_ssp
 
 
 def read_description(path: Path | str) -> FmuDescription:
@@ -35,6 +37,9 @@ def unpack(path: Path, folder: Path) -> Path:
     for component in read_ssp(path, fmus).system.components:
         # A copy each: two instances of one FMU get a library, and so global variables, of their own.
         unpack_fmu(archives / component.source, folder / "components" / component.name)
+    shutil.rmtree(archives)
+    with zipfile.ZipFile(path) as archive:
+        archive.extract(ROOT, folder)
     return folder
 
 

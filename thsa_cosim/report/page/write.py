@@ -114,13 +114,18 @@ def render(study: Study, shown: list[Section]) -> str:
         study=study,
         sections=shown,
         groups=[list(members) for _, members in groupby(shown, key=lambda section: section.group)],
-        figures={f.name: _figure_data(f) for section in shown for f in _figures(section.blocks)},
+        figures={name: _figure_data(figure) for name, figure in figures_of(shown).items()},
         style=Markup(_template("page.css")),
         scripts=[Markup(text) for text in scripts],
         # Only these scripts may run, and nothing may be fetched: a name that slipped through could do nothing.
         script_digests=[_digest(text) for text in scripts],
         version=__version__,
     )
+
+
+def figures_of(shown: Sequence[Section]) -> dict[str, Figure]:
+    """All figures of the sections by name, in their order."""
+    return {figure.name: figure for section in shown for figure in _figures(section.blocks)}
 
 
 def _figure_data(figure: Figure) -> dict[str, object]:

@@ -7,6 +7,7 @@ import numpy as np
 from thsa_cosim.costs import nrmse, rmse, signal_range
 from thsa_cosim.identify.problem import Case
 from thsa_cosim.identify.results import ChannelError, Comparison
+from thsa_cosim.inspection import Residual
 from thsa_cosim.recordings import Recording
 from thsa_cosim.signals import Signals
 
@@ -34,6 +35,24 @@ def compare(case: Case, recording: Recording, role: str, simulated: Signals) -> 
         simulated=on_samples,
         errors=errors,
     )
+
+
+def case_residuals(case: Case, simulated: Signals) -> list[Residual]:
+    """What a simulation leaves of each fitted signal, where it counts, with the inputs at the same samples."""
+    found = []
+    for channel in case.channels:
+        inputs = case.inputs.resample(channel.time)
+        found.append(
+            Residual(
+                recording=case.name,
+                channel=channel.name,
+                values=channel.residual(simulated) / np.sqrt(channel.weight),
+                noise=channel.noise,
+                unit=case.measured.units.get(channel.name, "1"),
+                inputs={name: inputs[name] for name in inputs.names},
+            )
+        )
+    return found
 
 
 def summarise(comparisons: Sequence[Comparison]) -> dict[str, dict[str, ChannelError]]:

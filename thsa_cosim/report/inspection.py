@@ -4,7 +4,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from thsa_cosim.inspection import FileReport, Finding, Inspection
+from thsa_cosim.inspection import FileReport, Finding, Inspection, Trust
 
 STYLES = {"note": "dim", "warning": "yellow", "error": "red"}
 
@@ -33,3 +33,16 @@ def _line(finding: Finding) -> Text:
     line = Text(f"{finding.severity}: ", style=STYLES[finding.severity])
     line.append(f"{finding.recording}, {finding.channel}: {finding.kind}: {finding.text}", style="default")
     return line
+
+
+def print_trust(console: Console, trust: Trust) -> None:
+    """Print why a fit does not explain its recordings; nothing if it does."""
+    if trust.verdict == "explained":
+        return
+    line = Text("not explained: ", style="red")
+    line.append(
+        "the values above are not to be believed, since the model leaves more than noise", style="default"
+    )
+    console.print(line, soft_wrap=True)
+    for reason in trust.reasons:
+        console.print(Text(f"  {reason}"), soft_wrap=True)

@@ -85,13 +85,13 @@ def recording(found: SignalFile) -> Drawing:
 
 
 def convergence(searches: Mapping[str, Sequence[float]], label: str) -> Drawing:
-    """Best cost against generation, one line a search."""
+    """Best cost against the generation of an evolution, or the step of a local search; one line a search."""
     figure = Drawing(figsize=(7.0, 4.4), layout="constrained")
     axes = figure.add_subplot()
     for name, costs in searches.items():
         axes.plot(range(len(costs)), costs, marker=".", lw=1.0, label=name)
     axes.set_yscale("log")
-    _label(axes, "generation [1]", label)
+    _label(axes, "generation or step [1]", label)
     axes.legend(frameon=False, fontsize=8)
     return figure
 

@@ -79,11 +79,14 @@ class IdentifyStudy(Study):
             found["laws"] = lambda: figures.laws(self, list(self.result["laws"]))
             for name in self.result["laws"]:
                 found[name] = lambda name=name: figures.laws(self, [name])  # type: ignore[misc]
-        if searches := {
-            str(point["label"]): [g["best_cost"] * _per_sample(point) for g in point["generations"]]
-            for point in self.parts("points")
-            if point.get("generations")
-        }:
+        searches: dict[str, list[float]] = {}
+        for point in self.parts("points"):
+            label, scale = str(point["label"]), _per_sample(point)
+            if point.get("generations"):
+                searches[label] = [g["best_cost"] * scale for g in point["generations"]]
+            for k, search in enumerate(point.get("local", ()), start=1):
+                searches[f"{label}, local {k}"] = [cost * scale for cost in search["cost"]]
+        if searches:
             found["convergence"] = lambda: figures.convergence(searches, "best cost per sample [1]")
         return found
 

@@ -117,7 +117,13 @@ class _Study:
             def on_generation(generation: Generation) -> None:
                 evaluator.note_generation(index, generation.index)
 
-            return lambda ask: search_point(self._points[index], settings, spec.polish, ask, on_generation)
+            def on_evolution() -> None:
+                evaluator.expect_evolution(index, spec)
+
+            point = self._points[index]
+            return lambda ask: search_point(
+                point, spec.method, settings, spec.polish, ask, on_generation, on_evolution
+            )
 
         tasks = [task(index) for index in range(len(self._points))]
         with closing(interleave(tasks, evaluator.serve)) as finished:

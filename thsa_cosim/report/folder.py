@@ -64,9 +64,17 @@ class Part:
         """Vectors of a generation."""
         return self._search("population")
 
+    @property
+    def searches_locally(self) -> bool:
+        """Whether local searches come first."""
+        return self._setting("method") == "local-first"
+
     def _search(self, key: str) -> int | None:
-        value = (self.result or {}).get("settings", {}).get(key, self.about.get(key))
+        value = self._setting(key)
         return value if isinstance(value, int) else None
+
+    def _setting(self, key: str) -> object:
+        return (self.result or {}).get("settings", {}).get(key, self.about.get(key))
 
 
 @dataclass(frozen=True, eq=False)

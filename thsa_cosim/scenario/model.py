@@ -14,7 +14,7 @@ from thsa_cosim.inspection import Inspection, inspect
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario.schema import CommonTable
-from thsa_cosim.search.strategies import Strategy
+from thsa_cosim.search.strategies import SearchMethod, Strategy
 from thsa_cosim.signals import Signals
 
 
@@ -117,8 +117,9 @@ class DiagnoseSpec:
 
 @dataclass(frozen=True)
 class SearchSpec:
-    """Differential evolution and what follows it; ``profile`` names parameters for a profile likelihood."""
+    """How parameters are searched; ``profile`` names those of which a profile likelihood is computed."""
 
+    method: SearchMethod = "local-first"
     population: int = 45
     generations: int = 30
     mutation: float = 0.16

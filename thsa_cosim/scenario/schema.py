@@ -12,7 +12,7 @@ from thsa_cosim.errors import did_you_mean
 from thsa_cosim.laws import FORMS
 from thsa_cosim.scenario.recording_schema import RecordingsTable, TemperatureTable
 from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order, check_pairs
-from thsa_cosim.search.strategies import Strategy
+from thsa_cosim.search.strategies import SearchMethod, Strategy
 
 
 class LawTable(Table):
@@ -170,10 +170,13 @@ class EvolutionTable(Table):
 
 
 class SearchTable(EvolutionTable):
-    """``[search]``: differential evolution, the article's setting by default."""
+    """``[search]``: local searches first, differential evolution where they do not agree on a minimum."""
 
+    method: SearchMethod = "local-first"
+    """``"local-first"``: least squares from spread starts; differential evolution only where they do not agree.
+    ``"differential-evolution"``: that alone, the article's way."""
     polish: bool = True
-    """Least squares from the best vector; standard errors need it."""
+    """Least squares from the best vector; standard errors need it. Without it the evolution runs alone."""
     profile: list[Name] = Field(default_factory=list)
     """Names of parameters whose profile likelihood is computed."""
 

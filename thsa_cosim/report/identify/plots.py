@@ -107,15 +107,21 @@ def plot_comparison(comparison: Comparison, path: Path) -> None:
 
 
 def plot_convergence(result: IdentifyResult, path: Path) -> None:
-    """Best cost per sample against generation, one line per point."""
+    """Cost per sample against the step of each local search, or against generation; one colour per point."""
     figure = Figure(figsize=(7.0, 4.6), layout="constrained")
     axes = figure.add_subplot()
-    for point in result.points:
+    what = set()
+    for k, point in enumerate(result.points):
         scale = point.cost_per_sample / point.cost if point.cost else 1.0
-        cost = [generation.best_cost * scale for generation in point.generations]
-        axes.plot(range(len(cost)), cost, marker=".", lw=1.0, label=point.label)
+        best = [generation.best_cost for generation in point.generations]
+        lines = [best] if best else [search.history for search in point.local]
+        what.add("generation" if best else "step of a local search")
+        for j, line in enumerate(lines):
+            cost = [value * scale for value in line]
+            label = point.label if j == 0 else "_"
+            axes.plot(range(len(cost)), cost, marker=".", lw=1.0, color=f"C{k}", label=label)
     axes.set_yscale("log")
-    axes.set_xlabel("generation [1]")
+    axes.set_xlabel(f"{' or '.join(sorted(what))} [1]")
     axes.set_ylabel("best cost per sample [1] (1: noise)")
     axes.legend(frameon=False, fontsize=9)
     _tidy(axes)

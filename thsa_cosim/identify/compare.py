@@ -17,16 +17,16 @@ def compare(case: Case, recording: Recording, role: str, simulated: Signals) -> 
     measured = case.measured
     noise = {channel.name: channel.noise for channel in case.channels}
     on_samples = simulated.select(measured.names).resample(measured.time)
-    errors = {
-        name: ChannelError(
-            rmse=rmse(measured[name], on_samples[name]),
-            nrmse=nrmse(measured[name], on_samples[name]),
+    errors = {}
+    for name in measured.names:
+        kept = recording.counted(name)
+        errors[name] = ChannelError(
+            rmse=rmse(measured[name][kept], on_samples[name][kept]),
+            nrmse=nrmse(measured[name][kept], on_samples[name][kept]),
             noise=noise.get(name, recording.noise.get(name, 0.0)),
             unit=measured.units[name],
-            samples=measured.time.size,
+            samples=int(np.count_nonzero(kept)),
         )
-        for name in measured.names
-    }
     return Comparison(
         recording=case.name,
         role=role,
@@ -62,16 +62,16 @@ def summarise(comparisons: Sequence[Comparison]) -> dict[str, dict[str, ChannelE
         members = [c for c in comparisons if c.role == role]
         for name in members[0].errors if members else ():
             measured = np.concatenate([c.measured[name] for c in members])
-            simulated = np.concatenate([c.simulated[name] for c in members])
             weights = np.array([c.errors[name].samples for c in members], dtype=np.float64)
             noises = np.array([c.errors[name].noise for c in members])
-            error = rmse(measured, simulated)
+            errors = np.array([c.errors[name].rmse for c in members])
+            error = float(np.sqrt(np.sum(weights * errors**2) / np.sum(weights)))
             span = signal_range(measured)
             channels[name] = ChannelError(
                 rmse=error,
                 nrmse=error / span if span > 0.0 else float("nan"),
                 noise=float(np.sqrt(np.sum(weights * noises**2) / np.sum(weights))),
                 unit=members[0].errors[name].unit,
-                samples=measured.size,
+                samples=int(np.sum(weights)),
             )
     return summary

@@ -10,6 +10,16 @@
 from thsa_cosim.inspection.file import FileReport, inspect_file
 from thsa_cosim.inspection.finding import Finding, Inspection
 from thsa_cosim.inspection.recording import inspect
-from thsa_cosim.inspection.trust import Residual, Trust, judge
+from thsa_cosim.inspection.trust import Residual, Trust, judge, judge_ratios
 
-__all__ = ["FileReport", "Finding", "Inspection", "Residual", "Trust", "inspect", "inspect_file", "judge"]
+__all__ = [
+    "FileReport",
+    "Finding",
+    "Inspection",
+    "Residual",
+    "Trust",
+    "inspect",
+    "inspect_file",
+    "judge",
+    "judge_ratios",
+]

@@ -76,7 +76,7 @@ class Channel:
     @cached_property
     def silent(self) -> bool:
         """Whether nothing but the quantisation can be seen of its noise: a command, a coarse encoder, a simulation."""
-        return self.noise <= max(1.01 * self.quantum / np.sqrt(12.0), _SILENT * self.range)
+        return bool(self.noise <= max(1.01 * self.quantum / np.sqrt(12.0), _SILENT * self.range))
 
     @cached_property
     def profile(self) -> FloatArray:

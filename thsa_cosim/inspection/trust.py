@@ -60,6 +60,14 @@ def judge(residuals: Sequence[Residual]) -> Trust:
     return Trust("not-explained" if reasons else "explained", tuple(reasons[:_MOST_REASONS]))
 
 
+def judge_ratios(ratios: Mapping[str, float]) -> Trust:
+    """Return the same from nothing but rmse / noise of each channel."""
+    reasons = [
+        f"{name} is missed by {r:.3g} times its noise" for name, r in ratios.items() if not r <= _LARGE
+    ]
+    return Trust("not-explained" if reasons else "explained", tuple(reasons[:_MOST_REASONS]))
+
+
 def _channel(channel: str, own: Sequence[Residual]) -> list[str]:
     reasons = []
     sizes = {r.recording: _rms(r.values) for r in own}

@@ -63,7 +63,10 @@ def _without_rest(values: FloatArray) -> FloatArray:
     """Leave out long runs of one value (a sensor that is stuck, a held command), if enough else is there."""
     starts = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0.0) + 1))
     lengths = np.diff(np.concatenate((starts, [values.size])))
-    moving = np.repeat(lengths < RESTING, lengths)
+    short = lengths < RESTING
+    # On a coarse lattice a slow signal has long runs everywhere: those are no rest.
+    usual = float(np.quantile(lengths[short], 0.9)) if short.any() else float(RESTING)
+    moving = np.repeat(lengths < max(RESTING, 10.0 * usual), lengths)
     return values[moving] if np.sum(moving) >= max(100, values.size // 20) else values
 
 

@@ -112,6 +112,13 @@ class Recording:
         """Length in s."""
         return float(self.signals.time[-1] - self.signals.time[0])
 
+    def counted(self, name: str) -> Mask:
+        """Which samples of :attr:`compared` count for a signal: all but those that repairs leave out; (n,) of bool."""
+        kept = np.ones(self.signals.time.shape, dtype=np.bool_)
+        if name in self.left_out:
+            kept = ~self.left_out[name]
+        return kept[kept.size - len(self.compared) :]
+
     @property
     def compared(self) -> Signals:
         """The signals after the lead-in."""

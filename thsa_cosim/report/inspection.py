@@ -1,5 +1,7 @@
 """What the terminal says about recordings: one line per finding."""
 
+from collections.abc import Sequence
+
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -19,14 +21,36 @@ def print_file(console: Console, report: FileReport) -> None:
         noise = "" if role else f"{column.noise:.3g}"
         table.add_row(Text(column.name + role), Text(column.unit or "not stated"), noise)
     console.print(table)
-    print_inspection(console, report.data)
+    print_inspection(console, report.data, remedies=True)
     console.print(f"verdict: {report.to_dict()['verdict']}", highlight=False)
 
 
-def print_inspection(console: Console, data: Inspection) -> None:
-    """Print one line per finding, the gravest first."""
+def print_inspection(
+    console: Console, data: Inspection, *, notes: bool = True, remedies: bool = False
+) -> None:
+    """Print one line per finding, the gravest first, and one per repair.
+
+    Without ``notes`` only warnings and errors; with ``remedies`` also the lines for the scenario that deal with them.
+    """
     for finding in data.findings:
-        console.print(_line(finding), soft_wrap=True)
+        if notes or finding.severity != "note":
+            console.print(_line(finding), soft_wrap=True)
+    for sentence in data.repairs:
+        console.print(Text(f"repaired: {sentence}"), soft_wrap=True)
+    lines = list(dict.fromkeys(f.remedy for f in data.findings if f.remedy and f.severity != "note"))
+    if remedies and lines:
+        console.print("\nLines for the scenario that would deal with it (each is a choice of yours):")
+        for text in _merged(lines):
+            console.print(Text(text), soft_wrap=True)
+
+
+def _merged(remedies: Sequence[str]) -> list[str]:
+    """One table per heading, with the keys of all remedies below it."""
+    tables: dict[str, dict[str, None]] = {}
+    for remedy in remedies:
+        heading, _, keys = remedy.partition("\n")
+        tables.setdefault(heading, {}).update(dict.fromkeys(keys.splitlines()))
+    return ["\n".join((heading, *keys)) for heading, keys in tables.items()]
 
 
 def _line(finding: Finding) -> Text:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from thsa_cosim.scenario import Scenario
 
 
+#: Exit code of a study that has no usable result.
+NOT_TESTED = 3
+
+
 @click.command()
 @study_options
 @click.option("--package", type=PATH, default=None, help="Folder of the model's Modelica package.")
@@ -42,6 +46,8 @@ def diagnose(options: StudyOptions, package: Path | None) -> None:
     files = sum(path.is_file() for path in folder.rglob("*"))
     content = _read(folder / RESULT)
     options.conclude(folder / RESULT, files, lambda out: print_diagnosis(out, content))
+    if content["verdict"] == "not-tested":
+        raise click.exceptions.Exit(NOT_TESTED)
 
 
 def _with_package(scenario: "Scenario", package: Path | None) -> "Scenario":

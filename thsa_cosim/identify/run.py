@@ -1,5 +1,6 @@
 """The use case: scenario → searches over a runner → parameters per point → laws → result."""
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
@@ -24,6 +25,7 @@ from thsa_cosim.identify.results import (
     PointResult,
     Progress,
 )
+from thsa_cosim.identify.silent import note_on, silent_parameters
 from thsa_cosim.inspection import Residual, judge
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario, open_runner
@@ -72,12 +74,17 @@ def identify(
         try:
             experiments = _experiments(points, held_out)
             with open_runner(scenario.simulation, experiments, workers, cluster) as runner:
+                study.note(runner.notes)
                 evaluator = Evaluator(runner, journal, points, names, channels, on_progress)
+                study.try_parameters(evaluator)
                 study.search(evaluator)
                 study.validate(runner)
         except KeyboardInterrupt:
             study.interrupted = True
     return study.result()
+
+
+_log = logging.getLogger(__name__)
 
 
 class _Study:
@@ -97,6 +104,19 @@ class _Study:
         self._comparisons: list[Comparison] = []
         self._notes: list[str] = []
         self._evaluator: Evaluator | None = None
+
+    def note(self, notes: Sequence[str]) -> None:
+        """Take sentences for the result."""
+        self._notes += notes
+
+    def try_parameters(self, evaluator: Evaluator) -> None:
+        """Name the parameters that do nothing, before any search."""
+        silent = silent_parameters(self._points[0], lambda request: evaluator.serve([(0, request)])[0])
+        if silent:
+            sentences = note_on(silent)
+            self.note(sentences)
+            for sentence in sentences:
+                _log.warning(sentence)
 
     def search(self, evaluator: Evaluator) -> None:
         """Search all points at once; what is finished is kept whatever happens to the rest."""

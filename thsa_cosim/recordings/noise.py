@@ -65,7 +65,9 @@ def _without_rest(values: FloatArray) -> FloatArray:
     lengths = np.diff(np.concatenate((starts, [values.size])))
     short = lengths < RESTING
     # On a coarse lattice a slow signal has long runs everywhere: those are no rest.
-    usual = float(np.quantile(lengths[short], 0.9)) if short.any() else float(RESTING)
+    usual = (
+        float(np.quantile(np.repeat(lengths[short], lengths[short]), 0.9)) if short.any() else float(RESTING)
+    )
     moving = np.repeat(lengths < max(RESTING, 10.0 * usual), lengths)
     return values[moving] if np.sum(moving) >= max(100, values.size // 20) else values
 

@@ -135,6 +135,7 @@ class SimulationSpec:
     """How the FMU is run: communication ``step`` [s] (None: the samples), ``deadline`` [s], ``memory_mb``."""
 
     interface: Literal["co-simulation", "model-exchange"] | None = None
+    inputs: Literal["hold", "mean", "derivative", "intermediate"] | None = None
     tolerance: float | None = None
     step: float | None = None
     deadline: float = 60.0

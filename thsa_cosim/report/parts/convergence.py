@@ -35,7 +35,7 @@ def convergence(part: Part) -> Section | None:
     if local:
         blocks.append(_local_figure(part, local))
     if found:
-        blocks.append(_figure(part, found))
+        blocks.append(_figure(part, found, "evolution" if local else "convergence"))
     ends = _ends(part)
     if ends:
         blocks.append(_ends_table(part, ends))
@@ -85,7 +85,9 @@ def _local_figure(part: Part, points: list[Json]) -> Figure:
     """Cost after each step of every local search, one panel per point."""
     columns = min(COLUMNS, len(points))
     rows = -(-len(points) // columns)
-    drawn = Chart(f"{part.prefix}local", rows=rows, columns=columns, row_height=230 if rows > 1 else 290)
+    drawn = Chart(
+        f"{part.prefix}convergence", rows=rows, columns=columns, row_height=230 if rows > 1 else 290
+    )
     for k, point in enumerate(points):
         at = divmod(k, columns)
         scale = point["cost_per_sample"] / point["cost"] if point["cost"] else 1.0
@@ -107,12 +109,10 @@ def _local_figure(part: Part, points: list[Json]) -> Figure:
     )
 
 
-def _figure(part: Part, found: list[Evolution]) -> Figure:
+def _figure(part: Part, found: list[Evolution], name: str) -> Figure:
     columns = min(COLUMNS, len(found))
     rows = -(-len(found) // columns)
-    drawn = Chart(
-        f"{part.prefix}convergence", rows=rows, columns=columns, row_height=230 if rows > 1 else 290
-    )
+    drawn = Chart(f"{part.prefix}{name}", rows=rows, columns=columns, row_height=230 if rows > 1 else 290)
     scales = _scales(part)
     for k, evolution in enumerate(found):
         at = divmod(k, columns)

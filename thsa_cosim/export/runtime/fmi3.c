@@ -14,6 +14,7 @@
 #include <string.h>
 #include "fmi3Functions.h"
 #include "instance.h"
+#include "trajectory.h"
 
 typedef struct {
     Instance core; /* first member: an Instance * is a Component * */
@@ -520,6 +521,18 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     const Status status = instance_do_step(CORE, currentCommunicationPoint, communicationStepSize);
     *lastSuccessfulTime = CORE->s.now.time;
+    return (fmi3Status)status;
+}
+
+/* Beside the FMI: a whole run in one call (trajectory.h). */
+#define thsaTrajectory1 fmi3FullName(thsaTrajectory1)
+
+FMI3_Export fmi3Status thsaTrajectory1(fmi3Instance instance, Trajectory *run);
+
+fmi3Status thsaTrajectory1(fmi3Instance instance, Trajectory *run) {
+    REQUIRE(STEP_MODE, CO_SIMULATION);
+    REQUIRE_ARRAYS(1, run, run);
+    const Status status = trajectory_run(CORE, run);
     return (fmi3Status)status;
 }
 

@@ -72,8 +72,8 @@ def warm_up() -> None:
     import thsa_cosim.check
     import thsa_cosim.diagnosis
     import thsa_cosim.identify
-    import thsa_cosim.report.study
-    import thsa_cosim.report.tune_study
+    import thsa_cosim.report.identify.files
+    import thsa_cosim.report.tune.files
     import thsa_cosim.simulate
     import thsa_cosim.staged
     import thsa_cosim.tune  # noqa: F401

@@ -25,7 +25,7 @@ html_show_sphinx = False
 
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
-# Notebooks are executed by tests/test_notebooks.py; the pages show the outputs that they hold.
+# Notebooks are executed by tests/docs/test_notebooks.py; the pages show the outputs that they hold.
 nb_execution_mode = "off"
 
 autodoc_typehints = "description"

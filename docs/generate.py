@@ -4,7 +4,7 @@
 
 ``--check`` changes nothing and ends with exit code 1 if a page is stale. What the pages say stands in the code: in the
 docstrings of the tables' classes and keys (``thsa_cosim/scenario``), in the commands' help (``thsa_cosim/cli``) and in
-the effects (``thsa_cosim/diagnosis/effects``).
+the effects (``thsa_cosim/diagnosis/catalogue/effects``).
 """
 
 import sys

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from thsa_cosim.batch import Journal, JournalRow, Status
-from thsa_cosim.identify import open_study
 from thsa_cosim.report.signal_files import write_signals
 from thsa_cosim.signals import Signals
+from thsa_cosim.study import open_study
 
 COMMAND = "thsa-cosim identify bench.toml -o studies/bench"
 POPULATION, GENERATIONS = 6, 3

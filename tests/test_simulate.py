@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from fmu.test_plant import lag
 from fmu_sources import build
-from test_fmu_plant import lag
 
 from thsa_cosim.errors import StudyError
 from thsa_cosim.scenario import load_scenario

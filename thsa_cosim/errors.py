@@ -11,6 +11,7 @@
     │   ├── FmuError            an archive that is no usable FMU
     │   └── ModelicaError       a model outside the exportable subset
     ├── MissingExtraError       an optional dependency is needed: exit code 2
+    ├── MachineError            the machine's fault, not the FMU's: exit code 3
     └── StudyError              the study ran but has no usable result: exit code 3
 
 Every message is one sentence that names the file, the key and the remedy. A simulation that fails is
@@ -61,6 +62,16 @@ class MissingExtraError(ThsaCosimError):
 
     def __init__(self, feature: str, extra: str) -> None:
         super().__init__(f"{feature} needs an optional part: pip install 'thsa-cosim[{extra}]'.")
+
+
+class MachineError(ThsaCosimError):
+    """The machine is at fault: a disk, the temporary folder, memory, a signal from outside.
+
+    Says nothing about an FMU or its parameters, so nothing may be recorded of the run; the message names
+    the place and the remedy, and the same command goes on once that is done.
+    """
+
+    exit_code = 3
 
 
 class StudyError(ThsaCosimError):

@@ -135,6 +135,7 @@ def simulate(
     useful = min(workers, max(len(experiments), 1))
     with open_runner(scenario.simulation, experiments, useful, cluster) as runner:
         outcomes = runner.run([Job(e.name) for *_, e in cases], count)
+        notes = (*scenario.notes, *runner.notes)
     results = tuple(
         _compare(scenario, recording, role, outcome)
         for (recording, role, _), outcome in zip(cases, outcomes, strict=True)
@@ -145,7 +146,7 @@ def simulate(
         raise StudyError(f"All {len(results)} simulations failed, {number} of them because {reason}.")
     folder.mkdir(parents=True, exist_ok=True)
     files = [_write_csv(folder, r) for r in results if r.simulated is not None]
-    result = SimulateResult(scenario, results, failures, (folder / RESULT, *files), scenario.notes)
+    result = SimulateResult(scenario, results, failures, (folder / RESULT, *files), notes)
     partial = folder / f"{RESULT}.part"
     partial.write_text(json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     partial.replace(folder / RESULT)

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from thsa_cosim.errors import InputError, StudyError
-from thsa_cosim.identify import IdentifyResult, PointResult, Progress, identify, open_study, study_identity
+from thsa_cosim.identify import IdentifyResult, PointResult, Progress, identify
 from thsa_cosim.identify.over_temperature import values_at
 from thsa_cosim.identify.parameter_set import parameter_set
 from thsa_cosim.identify.problem import Given
 from thsa_cosim.scenario import Scenario, Stage, StagedScenario, hand_on
 from thsa_cosim.simulate import SimulateResult, simulate
 from thsa_cosim.ssv import ParameterSet
+from thsa_cosim.study import open_study, stages_identity, study_identity
 from thsa_cosim.units import conversion
 
 
@@ -75,17 +76,9 @@ def run_stages(
     InputError, StudyError
         As the stages' own runs, and StudyError if a stage lacks a value that a later one needs.
     """
-    identities = [study_identity(stage.scenario) for stage in staged.stages]
-    recordings = [identity.pop("recordings") for identity in identities]
     open_study(
         folder,
-        {
-            "kind": f"{staged.kind} in stages",
-            "scenario": [identity["scenario"] for identity in identities],
-            "fmu": [identity["fmu"] for identity in identities],
-            "recordings": recordings,
-            "seed": [identity["seed"] for identity in identities],
-        },
+        stages_identity(staged),
         {
             "title": staged.title or staged.path.stem,
             "scenario": str(staged.path),
@@ -102,6 +95,7 @@ def run_stages(
             scenario = hand_on(earlier.stage, earlier.found, scenario)
         place = folder / f"{number}_{stage.name}"
         if scenario.kind == "simulate":
+            open_study(place, study_identity(scenario))
             simulated[stage.name] = simulate(scenario, folder=place, workers=workers, cluster=cluster)
             continue
         label = f"stage {number} of {len(staged.stages)}, {stage.name}"

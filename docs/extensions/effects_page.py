@@ -1,10 +1,10 @@
 """The catalogue of effects, from the effects themselves."""
 
-from thsa_cosim.diagnosis.catalogue import catalogue
-from thsa_cosim.diagnosis.effect import Effect
+from thsa_cosim.diagnosis.catalogue.effect import Effect
+from thsa_cosim.diagnosis.catalogue.known import known_effects
 
 HEAD = """\
-<!-- Written by docs/generate.py from thsa_cosim/diagnosis/effects: change the effects there. -->
+<!-- Written by docs/generate.py from thsa_cosim/diagnosis/catalogue/effects: change the effects there. -->
 
 # The catalogue of effects
 
@@ -15,7 +15,7 @@ What `thsa-cosim diagnose` tries. A name is followed by the place where a fricti
 
 def effects_page() -> str:
     """Return the page's Markdown."""
-    return "\n".join([HEAD, *(_section(effect) for _, effect in sorted(catalogue().items()))])
+    return "\n".join([HEAD, *(_section(effect) for _, effect in sorted(known_effects().items()))])
 
 
 def _section(effect: Effect) -> str:

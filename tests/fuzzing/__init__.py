@@ -8,5 +8,5 @@
 ``cases``       one case: a folder, a command line, all drawn from ``(kind, seed, index)``
 ``sandbox``     runs a case with a deadline and judges what it did
 
-``benchmarks/fuzz.py`` is its command line, ``tests/test_fuzz.py`` a small sample of it.
+``benchmarks/fuzz.py`` is its command line, ``tests/fuzzing/test_fuzz.py`` a small sample of it.
 """

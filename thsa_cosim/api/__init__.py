@@ -2,7 +2,6 @@
 
 ``run``      identify, tune, diagnose, simulate: a scenario in, a study out
 ``study``    what every study folder says; ``kinds``: what each kind says besides
-``figures``  its plots
 
 ``import thsa_cosim as tc`` offers all of it as ``tc.identify(...)`` and so on. A study is read from its folder, so
 that one that was run elsewhere opens as one that has just been run.

@@ -61,9 +61,9 @@ def identify(
         If every simulation failed.
     """
     from thsa_cosim.identify import identify as run
+    from thsa_cosim.report.identify.files import write_identify
     from thsa_cosim.report.progress import ProgressDisplay, console
     from thsa_cosim.report.staged import write_staged
-    from thsa_cosim.report.study import write_identify
     from thsa_cosim.scenario import Scenario, load_study
     from thsa_cosim.staged import run_stages
 
@@ -97,7 +97,7 @@ def tune(
     Gains that break a hard requirement are a result as well: see ``feasible``.
     """
     from thsa_cosim.report.progress import ProgressDisplay, console
-    from thsa_cosim.report.tune_study import write_tune
+    from thsa_cosim.report.tune.files import write_tune
     from thsa_cosim.scenario import load_tune
     from thsa_cosim.tune import tune as run
 
@@ -124,7 +124,7 @@ def diagnose(
 ) -> DiagnoseStudy:
     """Find what the model of ``scenario`` lacks; arguments and errors as of :func:`identify`."""
     from thsa_cosim.diagnosis import diagnose as run
-    from thsa_cosim.report.diagnosis_json import write_diagnosis
+    from thsa_cosim.report.diagnose.result import write_diagnosis
     from thsa_cosim.report.progress import StepDisplay, console
     from thsa_cosim.scenario import load_scenario
 
@@ -152,17 +152,17 @@ def simulate(
 
     Parameters that the scenario would identify keep their start values.
     """
-    from thsa_cosim.identify import open_study as claim_folder
-    from thsa_cosim.identify import study_identity
-    from thsa_cosim.report.study import write_simulate
+    from thsa_cosim.report.simulate.files import write_simulate
     from thsa_cosim.scenario import load_scenario
     from thsa_cosim.simulate import simulate as run
+    from thsa_cosim.study import open_study as claim_folder
+    from thsa_cosim.study import study_identity
 
     path = Path(scenario)
     loaded = load_scenario(path, fit=fit, validate=validate, fmu=fmu)
     suffix = "" if loaded.kind == "simulate" else "-simulate"
     place = Path(folder) if folder is not None else default_folder(path, suffix)
-    claim_folder(place, {**study_identity(loaded), "kind": "simulate"})
+    claim_folder(place, study_identity(loaded, "simulate"))
     write_simulate(run(loaded, folder=place, workers=workers or cores(), cluster=cluster), place)
     return _opened(place, SimulateStudy)
 

@@ -23,7 +23,7 @@ from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.local import LocalRunner
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.runner import OnOutcome, check_experiment, check_jobs, wrapper_names
-from thsa_cosim.errors import FmuError, MissingExtraError, StudyError
+from thsa_cosim.errors import FmuError, MachineError, MissingExtraError, StudyError
 from thsa_cosim.fmu.description import FmuDescription, read_description
 from thsa_cosim.fmu.scratch import ScratchFolder
 
@@ -78,6 +78,7 @@ class ClusterRunner:
             distributed: Any = importlib.import_module("distributed")
         except ImportError:
             raise MissingExtraError("Running on a cluster", "cluster") from None
+        self.notes: Sequence[str] = ()
         self._distributed = distributed
         self._descriptions, self._failures = _describe(experiments)
         self._wrapped = wrapper_names(experiments)
@@ -127,8 +128,11 @@ class ClusterRunner:
             waiting = self._round(jobs, waiting, finish)
             if not waiting:
                 break
-        for index in waiting:
-            finish(index, Outcome(Status.CRASH, "the cluster lost the workers of this job again and again"))
+        if waiting:
+            raise MachineError(
+                f"The cluster lost its workers {_ATTEMPTS} times; look after them (memory, job limits) and give the "
+                f"same command again."
+            )
         return [outcome for outcome in outcomes if outcome is not None]
 
     def _round(self, jobs: Sequence[Job], indexes: Sequence[int], finish: Any) -> list[int]:
@@ -218,11 +222,16 @@ def _content(value: object) -> bytes:
 
 
 def _task_failure(result: Any) -> Outcome:
-    """Outcome of a task that Dask gave up: a worker died under it several times, or it raised."""
+    """Outcome of a task that raised; MachineError if workers died under it, or the machine is to blame."""
     error = result[1] if isinstance(result, tuple) else result
     text = " ".join(f"{type(error).__name__}: {error}".split())[:500]
-    if type(error).__name__ == "KilledWorker":
-        return Outcome(Status.CRASH, "the cluster lost every worker that tried this job")
+    if isinstance(error, MachineError):
+        raise error
+    if type(error).__name__ == "KilledWorker":  # FMUs run in processes of their own: it is not their doing
+        raise MachineError(
+            "The cluster lost every worker that tried one of the simulations; look after them (memory, job limits) "
+            "and give the same command again."
+        )
     return Outcome(Status.LOAD_ERROR, f"the cluster's worker raised {text}")
 
 

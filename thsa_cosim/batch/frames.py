@@ -3,13 +3,21 @@
 import os
 import pickle
 import struct
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, BinaryIO, NamedTuple
 
 from thsa_cosim.batch.outcome import Outcome
 
-_LENGTH = struct.Struct("<Q")
+_HEAD = struct.Struct("<4sIQ")
+"""Mark, checksum and length of what follows: an FMU may write into any descriptor of its process."""
+_MARK = b"THSA"
+_LONGEST = 2**33
+
+
+class MalformedMessage(Exception):
+    """What came through a pipe is no message."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +45,8 @@ class Ready:
 
     rss: int
     """Resident bytes of the idle worker."""
+    pid: int
+    """Its process id (the runner started the process that supervises it)."""
 
 
 class Order(NamedTuple):
@@ -67,7 +77,12 @@ class Done(NamedTuple):
     outcome: Outcome
     rss: int
     leaves: bool
-    """The worker ends itself now, as the FMU reported a fatal error."""
+    """The worker ends itself now: a fatal error, or what the FMU has changed in its process."""
+
+
+@dataclass(frozen=True)
+class Malformed:
+    """Stands for what came out of a worker's pipe and is no message."""
 
 
 @dataclass(frozen=True)
@@ -75,25 +90,49 @@ class Stop:
     """Last message to a worker; a pipe that ends without it means that the parent has died."""
 
 
+def pack(message: Any) -> bytes:
+    """Return one message as it travels."""
+    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    return _HEAD.pack(_MARK, zlib.crc32(data), len(data)) + data
+
+
 def write_frame(descriptor: int, message: Any) -> None:
     """Send one message; OSError if nobody reads any more."""
-    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
-    frame = memoryview(_LENGTH.pack(len(data)) + data)
+    frame = memoryview(pack(message))
     while frame:
         frame = frame[os.write(descriptor, frame) :]
 
 
-def read_frame(pipe: BinaryIO) -> Any | None:
-    """Wait for one message; None when the pipe has ended (a torn message counts as ended)."""
+def _length(head: bytes | bytearray | memoryview) -> tuple[int, int]:
+    mark, checksum, length = _HEAD.unpack_from(head)
+    if mark != _MARK or length > _LONGEST:
+        raise MalformedMessage
+    return checksum, length
+
+
+def _unpack(data: bytes, checksum: int) -> Any:
+    if zlib.crc32(data) != checksum:
+        raise MalformedMessage
     try:
-        head = pipe.read(_LENGTH.size)
-        if len(head) < _LENGTH.size:
+        return pickle.loads(data)
+    except Exception:
+        raise MalformedMessage from None
+
+
+def read_frame(pipe: BinaryIO) -> Any | None:
+    """Wait for one message; None when the pipe has ended (a torn message counts as ended).
+
+    MalformedMessage for anything else.
+    """
+    try:
+        head = pipe.read(_HEAD.size)
+        if len(head) < _HEAD.size:
             return None
-        (length,) = _LENGTH.unpack(head)
+        checksum, length = _length(head)
         data = pipe.read(length)
     except (OSError, ValueError):
         return None
-    return pickle.loads(data) if len(data) == length else None
+    return _unpack(data, checksum) if len(data) == length else None
 
 
 class FrameReader:
@@ -103,13 +142,13 @@ class FrameReader:
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> Iterator[Any]:
-        """Take some bytes; yield the messages that are complete now."""
+        """Take some bytes; yield the messages that are complete now. MalformedMessage for what is none."""
         self._buffer += data
-        while len(self._buffer) >= _LENGTH.size:
-            (length,) = _LENGTH.unpack_from(self._buffer)
-            end = _LENGTH.size + length
+        while len(self._buffer) >= _HEAD.size:
+            checksum, length = _length(self._buffer)
+            end = _HEAD.size + length
             if len(self._buffer) < end:
                 return
-            message = pickle.loads(memoryview(self._buffer)[_LENGTH.size : end].tobytes())
+            message = _unpack(bytes(memoryview(self._buffer)[_HEAD.size : end]), checksum)
             del self._buffer[:end]
             yield message

@@ -9,10 +9,14 @@ import time
 from collections import deque
 from typing import Any, BinaryIO, Protocol
 
-from thsa_cosim.batch.frames import FrameReader, read_frame
+from thsa_cosim.batch.frames import FrameReader, Malformed, MalformedMessage, read_frame
 
 Event = tuple[Any, Any, float]
-"""(worker, message, time.monotonic() of its arrival); the message None says that the pipe has ended."""
+"""(worker, message, time.monotonic() of its arrival).
+
+The message None says that the pipe has ended, Malformed that something else than messages comes out of it; it is
+not read any further then.
+"""
 
 
 class Inbox(Protocol):
@@ -65,11 +69,16 @@ class SelectInbox:
         except OSError:
             data = b""
         now = time.monotonic()
-        if data:
-            self._events.extend((worker, message, now) for message in reader.feed(data))
-        else:
+        if not data:
             self._selector.unregister(pipe)
             self._events.append((worker, None, now))
+            return
+        try:
+            for message in reader.feed(data):
+                self._events.append((worker, message, now))
+        except MalformedMessage:
+            self._selector.unregister(pipe)
+            self._events.append((worker, Malformed(), now))
 
     def remove(self, worker: Any) -> list[Event]:
         """As ``Inbox.remove``."""
@@ -109,8 +118,12 @@ class ThreadInbox:
         """As ``Inbox.add``."""
 
         def listen() -> None:
-            while (message := read_frame(pipe)) is not None:
-                self._events.put((worker, message, time.monotonic()))
+            try:
+                while (message := read_frame(pipe)) is not None:
+                    self._events.put((worker, message, time.monotonic()))
+            except MalformedMessage:
+                self._events.put((worker, Malformed(), time.monotonic()))
+                return
             self._events.put((worker, None, time.monotonic()))
 
         thread = threading.Thread(target=listen, daemon=True)

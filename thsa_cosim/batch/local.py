@@ -1,15 +1,14 @@
 """Runs batches on this machine: spawned worker processes that an FMU may crash, hang or bloat."""
 
 import itertools
-import signal
 import time
 import weakref
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
+from thsa_cosim.batch.attempts import Attempt, Batch, fault_of, signal_name
 from thsa_cosim.batch.frames import Done, Order, Ready, Returned, Setup
 from thsa_cosim.batch.inbox import Inbox, open_inbox
 from thsa_cosim.batch.job import Experiment, Job
@@ -17,7 +16,9 @@ from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.process import Progress, WorkerProcess
 from thsa_cosim.batch.runner import OnOutcome, check_jobs, wrapper_names
 from thsa_cosim.batch.study import Study
+from thsa_cosim.batch.worker import LOST
 from thsa_cosim.errors import ParameterError, StudyError
+from thsa_cosim.fmu.machine import temporary_fault
 from thsa_cosim.fmu.plant import Backend, Kind, Reuse
 
 _TICK_S = 0.05
@@ -27,6 +28,10 @@ _START_LIMIT_S = 180.0
 _FAILED_STARTS = 3
 _CLOSE_S = 2.0
 _AHEAD_S = 0.02
+_SILENT_TICKS = 200
+_SILENT = (Status.EXIT, "the answer of the worker did not arrive: the FMU spoilt its pipe")
+_GARBLED = (Status.EXIT, "the FMU wrote into the worker's pipe")
+_CHANNEL = (_SILENT, _GARBLED)
 _AHEAD = 32
 """A worker has at hand what keeps it busy for _AHEAD_S, at most _AHEAD orders."""
 
@@ -35,8 +40,9 @@ class LocalRunner:
     """Worker processes with one live FMU instance each; see ``Runner``.
 
     A run that crashes, exits, hangs, outgrows its memory or floods its output costs its worker at most: the
-    job gets an Outcome that says so, jobs that were waiting in that worker go to others, and no job is
-    evaluated twice.
+    job gets an Outcome that says so, and jobs that were waiting in that worker go to others. A run that killed
+    its worker is repeated once, first in a fresh one, before that counts. So is one that failed through the
+    machine's fault (disk, memory, a signal from outside), which has no outcome but ends the batch.
     """
 
     def __init__(
@@ -77,9 +83,12 @@ class LocalRunner:
         ParameterError, FmuError
             If an experiment names variables that its FMU does not have. An FMU that cannot be read is an
             outcome (``Status.BAD_ARCHIVE``) of its jobs instead.
+        MachineError
+            If the temporary folder cannot be used.
         """
         if workers < 1:
             raise ParameterError(f"workers is {workers}; it must be at least 1.")
+        self.notes: Sequence[str] = ()
         self._study = Study(experiments)
         self._wrapped = wrapper_names(experiments)
         self._count = workers
@@ -112,14 +121,15 @@ class LocalRunner:
     def run(self, jobs: Sequence[Job], on_outcome: OnOutcome | None = None) -> list[Outcome]:
         """Run all jobs; see ``Runner.run``.
 
-        StudyError if workers cannot be started at all. KeyboardInterrupt, or whatever ``on_outcome``
+        StudyError if workers cannot be started at all, MachineError if the machine is to blame for a run that
+        failed twice: nothing is known of it. KeyboardInterrupt, or whatever ``on_outcome``
         raises, ends the batch: busy workers are killed, and the runner can be used again.
         """
         if not self._finalizer.alive:
             raise StudyError("The runner is closed; open a new one.")
         jobs = list(jobs)
         check_jobs(jobs, self._study.descriptions, self._wrapped)
-        batch = _Batch(jobs, on_outcome)
+        batch = Batch(jobs, on_outcome)
         try:
             for index, job in enumerate(jobs):
                 failure = self._study.failures.get(job.experiment)
@@ -128,7 +138,7 @@ class LocalRunner:
                 else:
                     batch.finish(index, failure)
             while batch.left:
-                self._staff(min(self._count, len(batch.pending) + len(batch.index)))
+                self._staff(min(self._count, batch.waiting + len(batch.index)), len(batch.retries))
                 self._feed(batch)
                 self._wait(batch)
         except BaseException:
@@ -150,11 +160,21 @@ class LocalRunner:
         self.close()
 
     # -- staff ----------------------------------------------------------------------------------------
-    def _staff(self, wanted: int) -> None:
+    def _staff(self, wanted: int, fresh: int = 0) -> None:
+        """Start workers until ``wanted`` are there, as far as possible ``fresh`` ones among them."""
+        missing = fresh - sum(w.is_fresh for w in self._workers)
+        for worker in [w for w in self._workers if not (w.is_fresh or w.assigned or w.is_leaving)]:
+            if missing > 0:
+                worker.is_leaving = True
+                worker.ask_to_stop()
+                missing -= 1
         present = sum(not w.is_leaving for w in self._workers)
         for _ in range(present, wanted):
             folder = self._study.folder / "workers" / str(next(self._numbers))
-            self._workers.append(WorkerProcess(self._setup, folder, self._inbox))
+            try:
+                self._workers.append(WorkerProcess(self._setup, folder, self._inbox))
+            except OSError as error:
+                raise self._study.trouble() or temporary_fault(error, self._study.folder.parent) from None
 
     def _dismiss(self, worker: WorkerProcess) -> int:
         """Kill and forget a worker; return its exit code."""
@@ -162,7 +182,7 @@ class LocalRunner:
             self._workers.remove(worker)
         return worker.reap()
 
-    def _feed(self, batch: "_Batch") -> None:
+    def _feed(self, batch: Batch) -> None:
         """Give every worker a job, then some at hand, so that it never waits for the next one.
 
         The shorter the runs, the more orders go into one message. Near the end of a batch nobody hoards.
@@ -171,6 +191,10 @@ class LocalRunner:
         # Nothing is sent to a worker that is being recalled: its listener may be waiting to answer.
         staff = [w for w in self._workers if w.is_ready and not w.is_leaving and not w.is_recalled]
         for worker in staff:
+            if worker.is_fresh and batch.retries:
+                batch.pending.appendleft(batch.retries.popleft())
+                self._give(worker, 1, batch)
+        for worker in staff:
             if not worker.assigned and batch.pending:
                 self._give(worker, 1, batch)
         for worker in staff:
@@ -178,7 +202,7 @@ class LocalRunner:
                 fair = len(batch.pending) // len(staff)
                 self._give(worker, min(1 + ahead - len(worker.assigned), fair), batch)
 
-    def _give(self, worker: WorkerProcess, count: int, batch: "_Batch") -> None:
+    def _give(self, worker: WorkerProcess, count: int, batch: Batch) -> None:
         orders = []
         for _ in range(count):
             index = batch.pending.popleft()
@@ -191,7 +215,7 @@ class LocalRunner:
         if orders:
             worker.give(orders)
 
-    def _recall(self, batch: "_Batch") -> None:
+    def _recall(self, batch: Batch) -> None:
         """When somebody idles, take back what waits behind a run that takes long (it may hang)."""
         if batch.pending or not any(
             w.is_ready and not w.is_leaving and not w.assigned for w in self._workers
@@ -208,7 +232,7 @@ class LocalRunner:
                 worker.recall()
 
     # -- events ---------------------------------------------------------------------------------------
-    def _wait(self, batch: "_Batch") -> None:
+    def _wait(self, batch: Batch) -> None:
         """Handle one event, or a tick of the clock."""
         event = self._inbox.get(_TICK_S)
         if event is not None and event[0] in self._workers:
@@ -217,21 +241,23 @@ class LocalRunner:
             self._next_tick = time.monotonic() + _TICK_S
             self._inspect(batch)
 
-    def _handle(self, worker: WorkerProcess, message: Any, at: float, batch: "_Batch") -> None:
+    def _handle(self, worker: WorkerProcess, message: Any, at: float, batch: Batch) -> None:
         match message:
-            case Ready(rss=rss):
-                worker.is_ready, worker.idle_rss, worker.since = True, rss, at
+            case Ready(rss=rss, pid=pid):
+                worker.is_ready, worker.idle_rss, worker.since, worker.worker_pid = True, rss, at, pid
                 self._failed_starts = 0
-            case Done() as done:
+            case Done() as done if worker.assigned and worker.assigned[0].serial == done.serial:
                 self._finished(worker, done, at, batch)
             case Returned(serials=serials):
                 self._returned(worker, serials, batch)
             case None:
                 self._died(worker, batch, None)
+            case _:
+                self._died(worker, batch, _GARBLED)
 
-    def _finished(self, worker: WorkerProcess, done: Done, at: float, batch: "_Batch") -> None:
+    def _finished(self, worker: WorkerProcess, done: Done, at: float, batch: Batch) -> None:
         worker.assigned.popleft()
-        worker.since = at
+        worker.since, worker.silent_ticks = at, 0
         worker.runs += 1
         worker.is_leaving |= done.leaves
         outcome = done.outcome
@@ -241,21 +267,24 @@ class LocalRunner:
                 outcome, console=(worker.console_head + outcome.console)[: worker.console_limit]
             )
             worker.console_head = ""
-        batch.finish(batch.index.pop(done.serial), outcome)
+        trouble = None if outcome.ok else self._study.trouble()
+        fault = fault_of(outcome, trouble)
+        attempt = Attempt(outcome, fault, was_first=worker.runs == 1)
         tired = worker.runs >= self._recycle_runs or done.rss - worker.idle_rss >= self._recycle_growth
         if tired and not worker.is_leaving:
             worker.is_leaving = True
             worker.ask_to_stop()  # comes after the orders that it still has
+        batch.ended(batch.index.pop(done.serial), attempt)
 
     @staticmethod
-    def _returned(worker: WorkerProcess, serials: tuple[int, ...], batch: "_Batch") -> None:
+    def _returned(worker: WorkerProcess, serials: tuple[int, ...], batch: Batch) -> None:
         worker.is_recalled = False
         back = [order for order in worker.assigned if order.serial in serials]
         for order in reversed(back):
             worker.assigned.remove(order)
             batch.pending.appendleft(batch.index.pop(order.serial))
 
-    def _inspect(self, batch: "_Batch") -> None:
+    def _inspect(self, batch: Batch) -> None:
         """Kill workers that are late, too large, or do not start."""
         self._recall(batch)
         now = time.monotonic()
@@ -270,10 +299,15 @@ class LocalRunner:
             elif worker.assigned:
                 self._check_limits(worker, growth, batch)
 
-    def _check_limits(self, worker: WorkerProcess, growth: int, batch: "_Batch") -> None:
+    def _check_limits(self, worker: WorkerProcess, growth: int, batch: Batch) -> None:
         progress, now = worker.progress(), time.monotonic()
         if progress.serial != worker.assigned[0].serial:
-            return  # between two jobs: what it has finished is on its way
+            # Between two jobs: what it has finished is on its way, or an FMU has spoilt it.
+            worker.silent_ticks += 1
+            if worker.silent_ticks > _SILENT_TICKS:
+                self._died(worker, batch, _SILENT)
+            return
+        worker.silent_ticks = 0
         if progress.began is None:
             if now - worker.since > _START_LIMIT_S:
                 reason = f"the experiment was not read within {_START_LIMIT_S:g} s"
@@ -285,7 +319,7 @@ class LocalRunner:
             reason = f"the run outgrew {self._memory_limit / 2**20:.0f} MiB and was killed"
             self._died(worker, batch, (Status.MEMORY, reason))
 
-    def _died(self, worker: WorkerProcess, batch: "_Batch", cause: tuple[Status, str] | None) -> None:
+    def _died(self, worker: WorkerProcess, batch: Batch, cause: tuple[Status, str] | None) -> None:
         """Reap a worker; blame the job in work, if any, and put the others back to the front.
 
         ``cause`` says why the runner itself has had to kill it.
@@ -294,61 +328,50 @@ class LocalRunner:
         console = worker.console()
         code = self._dismiss(worker)
         for _, message, at in worker.last_words:
-            if isinstance(message, Done):
+            first = worker.assigned[0].serial if worker.assigned else None
+            if isinstance(message, Done) and message.serial == first:
                 self._finished(worker, message, at, batch)
         progress = worker.last_progress
         orders = list(worker.assigned)
         worker.assigned.clear()
         if not worker.is_ready:
             self._failed_starts += 1
+            if (trouble := self._study.trouble()) is not None:
+                raise trouble
             if self._failed_starts >= _FAILED_STARTS:
                 tail = " ".join(console.split())[-300:]
                 raise StudyError(f"Worker processes do not start (exit code {code}): {tail or 'no message'}.")
         # A job that began while the runner was killing its predecessor is innocent, and runs again.
         begun = bool(orders) and progress.serial == orders[0].serial
-        if begun and (cause is None or orders[0].serial == accused):
+        if orders and (cause in _CHANNEL or (begun and (cause is None or orders[0].serial == accused))):
             order = orders.pop(0)
-            status, reason = cause or self._cause_of_death(code, progress)
-            lasted = time.monotonic() - (progress.began or worker.since)
-            reason = f"{reason} {progress.where}"
-            batch.finish(batch.index.pop(order.serial), Outcome(status, reason, None, None, lasted, console))
+            attempt = self._post_mortem(worker, code, cause, console)
+            batch.ended(batch.index.pop(order.serial), attempt)
         for order in reversed(orders):
             batch.pending.appendleft(batch.index.pop(order.serial))
+
+    def _post_mortem(
+        self, worker: WorkerProcess, code: int, cause: tuple[Status, str] | None, console: str
+    ) -> Attempt:
+        """Say what the job in work died of."""
+        progress = worker.last_progress
+        status, reason = cause or self._cause_of_death(code, progress)
+        lasted = time.monotonic() - (progress.began or worker.since)
+        outcome = Outcome(status, f"{reason} {progress.where}", None, None, lasted, console)
+        own = cause is None or cause in _CHANNEL
+        fault = fault_of(outcome, self._study.trouble() if own else None)
+        killed_by = signal_name(code) if cause is None else ""
+        return Attempt(outcome, fault, killed_by, own, progress.place, was_first=worker.runs == 0)
 
     def _cause_of_death(self, code: int, progress: Progress) -> tuple[Status, str]:
         limit = self._memory_limit
         if limit is not None and progress.growth >= 0.7 * limit:
             return Status.MEMORY, f"the run outgrew {limit / 2**20:.0f} MiB and died"
+        if code == LOST:
+            return Status.EXIT, "the FMU closed or spoilt the worker's pipes"
         if code >= 0:
             return Status.EXIT, f"the FMU ended the process with exit code {code}"
-        try:
-            name = signal.Signals(-code).name
-        except ValueError:
-            name = f"signal {-code}"
-        return Status.CRASH, f"the process died by {name}"
-
-
-class _Batch:
-    """One call of ``run``: what is left to do."""
-
-    def __init__(self, jobs: list[Job], on_outcome: OnOutcome | None) -> None:
-        self.jobs = jobs
-        self.pending: deque[int] = deque()
-        self.index: dict[int, int] = {}
-        """Serial of an order -> index of its job, for orders in the hands of workers."""
-        self.left = len(jobs)
-        self._outcomes: list[Outcome | None] = [None] * len(jobs)
-        self._on_outcome = on_outcome
-
-    def finish(self, index: int, outcome: Outcome) -> None:
-        assert self._outcomes[index] is None
-        self._outcomes[index] = outcome
-        self.left -= 1
-        if self._on_outcome is not None:
-            self._on_outcome(index, outcome)
-
-    def result(self) -> list[Outcome]:
-        return [outcome for outcome in self._outcomes if outcome is not None]
+        return Status.CRASH, f"the process died by {signal_name(code)}"
 
 
 def _shut_down(workers: list[WorkerProcess], inbox: Inbox, study: Study) -> None:

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import sys
+from pathlib import Path
 
 _PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 
@@ -30,7 +31,10 @@ class ResidentMeter:
 
     def read(self) -> int:
         """Return the resident set size, 0 if unknown."""
-        return 0 if self._statm is None else int(os.pread(self._statm, 128, 0).split()[1]) * _PAGE
+        try:
+            return 0 if self._statm is None else int(os.pread(self._statm, 128, 0).split()[1]) * _PAGE
+        except (OSError, ValueError, IndexError):  # an FMU has closed the descriptor
+            return resident_bytes()
 
 
 def private_bytes() -> int:
@@ -63,3 +67,12 @@ def no_core_files() -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def kills_for_memory() -> int:
+    """How many processes the system has killed for want of memory since it started (Linux, else 0)."""
+    with contextlib.suppress(OSError, ValueError):
+        for line in Path("/proc/vmstat").read_text().splitlines():
+            if line.startswith("oom_kill "):
+                return int(line.split()[1])
+    return 0

@@ -15,16 +15,15 @@ from typing import Any, BinaryIO, cast
 
 import numpy as np
 
-from thsa_cosim.batch.frames import Order, Recall, Setup, Stop, write_frame
+from thsa_cosim.batch import supervisor
+from thsa_cosim.batch.frames import Order, Recall, Setup, Stop, pack
 from thsa_cosim.batch.inbox import Event, Inbox
 from thsa_cosim.batch.memory import resident_bytes
 from thsa_cosim.batch.worker import BEGAN, GROWTH, PROGRESS_SLOTS, SERIAL, read_console
 from thsa_cosim.fmu.instance import Phase
 
-_BOOT = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    "from thsa_cosim.batch.worker import main; main(sys.argv[2])"
-)
+_BOOT = ("-P", str(Path(supervisor.__file__)))
+"""The supervisor as a script, without its folder in sys.path."""
 _ONE_THREAD = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -34,6 +33,8 @@ _ONE_THREAD = (
     "NUMEXPR_NUM_THREADS",
     "NUMBA_NUM_THREADS",
 )
+_PATIENCE_S = 3.0
+"""How long a supervisor may take to end a worker and its family."""
 _FLOOD = 2**20
 """Bytes of console output above which the file is emptied while the run goes on."""
 
@@ -49,6 +50,8 @@ class Progress:
     """Bytes by which the job in work has grown the process, if a limit is set."""
     began: float | None
     """When its FMU was first touched (time.monotonic); None: not yet."""
+    place: tuple[float, ...] = ()
+    """Phase, time, step: two deaths at the same place are the FMU's doing."""
 
 
 class WorkerProcess:
@@ -65,6 +68,13 @@ class WorkerProcess:
         self.is_leaving = False
         self.is_recalled = False
         self.runs = 0
+        self.given = 0
+        """Orders that it was ever given; a fresh worker has had none."""
+        self.silent_ticks = 0
+        """How often it was seen between two jobs while an answer was awaited."""
+        self.worker_pid = 0
+        """0 until it is ready."""
+        self._outbox = b""
         self.idle_rss = 0
         self.since = time.monotonic()
         """When the worker went over to the first of ``assigned``; before that, when it was started."""
@@ -78,10 +88,10 @@ class WorkerProcess:
         self._progress_path = folder / "progress"
         self._progress_path.write_bytes(bytes(8 * PROGRESS_SLOTS))
         paths = [str(Path(p).absolute()) for p in sys.path]
-        environment = os.environ | dict.fromkeys(_ONE_THREAD, "1")
+        environment = os.environ | dict.fromkeys(_ONE_THREAD, "1") | {supervisor.TAG: str(folder)}
         with (folder / "console").open("ab") as console:
             self._process = subprocess.Popen(
-                [sys.executable, "-c", _BOOT, json.dumps(paths), setup.root],
+                [sys.executable, *_BOOT, json.dumps(paths), setup.root],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=console,
@@ -90,24 +100,38 @@ class WorkerProcess:
                 start_new_session=True,
             )
         self._stdin = cast(BinaryIO, self._process.stdin)
+        if os.name != "nt":
+            os.set_blocking(self._stdin.fileno(), False)  # a stopped worker does not read
         self._inbox = inbox
         inbox.add(self, cast(BinaryIO, self._process.stdout))
         self._send(replace(setup, folder=str(folder)))
 
     @property
     def pid(self) -> int:
-        """Process id."""
-        return self._process.pid
+        """Process id; that of the supervisor until the worker is ready."""
+        return self.worker_pid or self._process.pid
+
+    @property
+    def is_fresh(self) -> bool:
+        """Whether it was given nothing yet."""
+        return not self.given and not self.is_leaving
 
     def _send(self, message: Any) -> None:
+        self._outbox += pack(message)
+        self._flush()
+
+    def _flush(self) -> None:
+        """Send what the pipe takes now."""
         # A dead worker is noticed by the end of its pipe; what was sent to it is not lost but requeued.
         with contextlib.suppress(OSError, ValueError):
-            write_frame(self._stdin.fileno(), message)
+            while self._outbox:
+                self._outbox = self._outbox[os.write(self._stdin.fileno(), self._outbox) :]
 
     def give(self, orders: list[Order]) -> None:
         """Send orders; the worker runs them after those it already has."""
         if self.is_ready and not self.assigned:
             self.since = time.monotonic()
+        self.given += len(orders)
         self.assigned.extend(orders)
         self._send(orders)
 
@@ -121,7 +145,8 @@ class WorkerProcess:
         values = np.zeros(PROGRESS_SLOTS)
         with contextlib.suppress(OSError, ValueError):
             values = np.frombuffer(self._progress_path.read_bytes(), dtype=np.float64)
-        phase = Phase(int(values[0]))
+        values = np.nan_to_num(values)  # whatever an FMU has written there
+        phase = Phase(int(values[0])) if values[0] in list(Phase) else Phase.IDLE
         where = {
             Phase.STEP: f"while stepping at t = {values[1]:.9g} s",
             Phase.LOAD: "while loading the FMU",
@@ -133,7 +158,13 @@ class WorkerProcess:
             Phase.REDUCE: "in the cost",
             Phase.IDLE: "after the run",
         }
-        return Progress(int(values[SERIAL]), where[phase], int(values[GROWTH]), float(values[BEGAN]) or None)
+        return Progress(
+            int(values[SERIAL]),
+            where[phase],
+            int(values[GROWTH]),
+            float(values[BEGAN]) or None,
+            tuple(values[:3].tolist()),
+        )
 
     def console(self) -> str:
         """Return what the worker printed since its last finished run, cut."""
@@ -142,6 +173,7 @@ class WorkerProcess:
 
     def watch(self) -> int:
         """Stop floods of output; return by how many resident bytes the worker has grown."""
+        self._flush()
         console = self.folder / "console"
         with contextlib.suppress(OSError):
             if console.stat().st_size > _FLOOD:
@@ -151,18 +183,22 @@ class WorkerProcess:
         return resident_bytes(self.pid) - self.idle_rss if self.idle_rss else 0
 
     def reap(self) -> int:
-        """Kill what is left of the process and its children, remove its folder; return the exit code.
+        """Kill what is left of the worker and its descendants, remove its folder; return the exit code.
 
         The exit code is negative for a signal, as in ``subprocess``.
         """
         if self._process.returncode is None:
-            if hasattr(os, "killpg"):
-                # Before the leader is waited for: until then its number cannot be given to another process.
-                with contextlib.suppress(OSError):
-                    os.killpg(self._process.pid, signal.SIGKILL)
-            else:
+            # The supervisor kills the worker and its family, and ends as the worker did.
+            with contextlib.suppress(OSError):
+                self._process.terminate()
+            try:
+                self._process.wait(_PATIENCE_S)
+            except subprocess.TimeoutExpired:
                 self._process.kill()
-            self._process.wait()
+                self._process.wait()
+            if self._process.returncode == -signal.SIGKILL and os.name != "nt":
+                # It may be the supervisor itself that was killed.
+                supervisor.end_family(str(self.folder))
         self.last_progress = self.progress()
         with contextlib.suppress(OSError):
             self._stdin.close()

@@ -9,9 +9,10 @@ from typing import Any
 from thsa_cosim.batch.job import Experiment
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.runner import by_name, check_experiment
-from thsa_cosim.errors import FmuError
+from thsa_cosim.errors import FmuError, MachineError
 from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.description import FmuDescription, read_description
+from thsa_cosim.fmu.machine import refuse_noexec, temporary_fault
 from thsa_cosim.fmu.scratch import ScratchFolder
 
 
@@ -19,7 +20,8 @@ class Study:
     """Experiments made ready for workers that share a file system.
 
     ``folder``: fmus/<sha256>/ unpacked, experiments/<index>.pickle, workers/<number>/ (made by them).
-    An FMU that cannot be read is no error here: ``failures`` holds the outcome of all its jobs.
+    An FMU that cannot be read is no error here: ``failures`` holds the outcome of all its jobs. MachineError if
+    the temporary folder cannot be used.
     """
 
     def __init__(self, experiments: Sequence[Experiment]) -> None:
@@ -28,10 +30,15 @@ class Study:
         self.descriptions: dict[str, FmuDescription | None] = {}
         self.failures: dict[str, Outcome] = {}
         self.main: dict[str, Any] | None = None
+        self._made: list[Path] = []
         self._scratch = ScratchFolder()
         self.folder = self._scratch.path
         try:
+            refuse_noexec(self.folder)
             self._prepare()
+        except OSError as error:
+            self.remove()
+            raise temporary_fault(error, self.folder.parent) from None
         except BaseException:
             self.remove()
             raise
@@ -56,7 +63,21 @@ class Study:
                 # Only what it takes to import the main module (the rest may not, or need not, travel).
                 wanted = ("sys_argv", "init_main_from_name", "init_main_from_path")
                 self.main = {key: data_of_main[key] for key in wanted if key in data_of_main}
-            (self.folder / "experiments" / f"{self.index[name]}.pickle").write_bytes(data)
+            file = self.folder / "experiments" / f"{self.index[name]}.pickle"
+            file.write_bytes(data)
+            self._made += [file, self._fmu_folder(found) / "modelDescription.xml"]
+
+    def trouble(self) -> MachineError | None:
+        """Say what is wrong with the temporary folder: gone, in part or whole, or nothing can be written."""
+        probe = self.folder / "probe"
+        try:
+            for file in self._made:
+                file.stat()
+            probe.write_bytes(bytes(1 << 16))
+            probe.unlink()
+        except OSError as error:
+            return temporary_fault(error, self.folder.parent)
+        return None
 
     def _fmu_folder(self, description: FmuDescription) -> Path:
         return self.folder / "fmus" / description.sha256[:16]

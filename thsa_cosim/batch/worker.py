@@ -2,7 +2,8 @@
 
 Started as ``python -c BOOT`` by ``process.WorkerProcess``. Orders come in on stdin, results go out on what
 was stdout; file descriptors 1 and 2 are then pointed at the console file, so that nothing that native code
-prints can get between the messages.
+prints can get between the messages. It deletes nothing but what is in its own folder; when it loses its runner it
+just ends, and its supervisor cleans up.
 """
 
 import contextlib
@@ -26,6 +27,7 @@ import numpy as np
 
 from thsa_cosim.batch.frames import (
     Done,
+    MalformedMessage,
     Order,
     Ready,
     Recall,
@@ -38,10 +40,17 @@ from thsa_cosim.batch.frames import (
 from thsa_cosim.batch.job import Experiment
 from thsa_cosim.batch.memory import ResidentMeter, limit_growth, no_core_files, private_bytes
 from thsa_cosim.batch.outcome import Outcome, Status
-from thsa_cosim.errors import ThsaCosimError
+from thsa_cosim.batch.surroundings import (
+    Surroundings,
+    descriptors_leak,
+    open_descriptors,
+    out_of_reach,
+)
+from thsa_cosim.errors import MachineError, ThsaCosimError
 from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.failure import SimulationFailure
 from thsa_cosim.fmu.instance import Phase
+from thsa_cosim.fmu.machine import is_machines, temporary_fault
 from thsa_cosim.fmu.plant import Plant
 from thsa_cosim.signals import Signals
 
@@ -53,14 +62,23 @@ GROWTH = 5
 BEGAN = 6
 """Slot that holds when the job's FMU was first touched (time.monotonic, the same clock in all processes)."""
 
+LOST = 83
+"""Exit code of a worker that has lost the way to its runner."""
+_COPIED = 32 * 2**20
+"""An unpacked FMU up to this many bytes is copied for each worker, a larger one linked."""
+
 
 class Worker:
     """Runs orders; ``serve`` is the main loop."""
 
-    def __init__(self, setup: Setup, results: int) -> None:
+    def __init__(self, setup: Setup, orders: int, results: int) -> None:
         self._setup = setup
+        self._orders_pipe = orders
         self._results = results
         self._sending = threading.Lock()
+        self._folder = Path(setup.folder)
+        self._surroundings: Surroundings
+        self._leaves = False
         self._cwd = Path(setup.folder) / "cwd"
         with (Path(setup.folder) / "progress").open("r+b") as file:
             self._map = mmap.mmap(file.fileno(), PROGRESS_SLOTS * 8)
@@ -77,16 +95,17 @@ class Worker:
         """Start the thread that reads orders ahead and notices when the parent dies."""
 
         def listen() -> None:
-            while (message := read_frame(orders)) is not None:
-                if isinstance(message, Stop):
-                    self._orders.put(message)
-                    return
-                if isinstance(message, Recall):
-                    self._send(Returned(self._take_back()))
-                else:
-                    for order in message:
-                        self._orders.put(order)
-            parent_died(self._setup.root)
+            with contextlib.suppress(MalformedMessage):  # the FMU has read from our pipe
+                while (message := read_frame(orders)) is not None:
+                    if isinstance(message, Stop):
+                        self._orders.put(message)
+                        return
+                    if isinstance(message, Recall):
+                        self._send(Returned(self._take_back()))
+                    else:
+                        for order in message:
+                            self._orders.put(order)
+            end()
 
         threading.Thread(target=listen, daemon=True).start()
 
@@ -106,7 +125,7 @@ class Worker:
             with self._sending:
                 write_frame(self._results, message)
         except OSError:
-            parent_died(self._setup.root)
+            end()
 
     def serve(self) -> None:
         """Run orders until told to stop."""
@@ -115,18 +134,20 @@ class Worker:
         if self._setup.memory_limit is not None:
             self._floor = limit_growth(self._setup.memory_limit)
             threading.Thread(target=self._watch_memory, daemon=True).start()
-        self._send(Ready(self._meter.read()))
+        self._surroundings = Surroundings(self._folder, (self._results, self._orders_pipe))
+        files = open_descriptors()
+        self._send(Ready(self._meter.read(), os.getpid()))
         while not isinstance(order := self._orders.get(), Stop):
-            os.chdir(self._cwd)
             self._progress[: BEGAN + 1] = (Phase.LOAD, np.nan, 0.0, 0.0, order.serial, 0.0, 0.0)
             outcome = self._run(order)
-            leaves = self._live is not None and self._live.is_dead
+            is_dead = self._live is not None and self._live.is_dead
+            leaves = is_dead or self._leaves or descriptors_leak(files)
             done = Done(order.serial, outcome, self._meter.read(), leaves)
             self._send(done)
             self._progress[SERIAL] = 0.0
             if leaves:
-                break
-        if self._live is not None and not self._live.is_dead:
+                return
+        if self._live is not None:
             self._live.close()
 
     def _warm_up(self) -> None:
@@ -141,23 +162,34 @@ class Worker:
         reduced = None
         status, reason = Status.OK, ""
         try:
+            self._surroundings.prepare()
             experiment, plant = self._experiment(order.experiment)
             # Deadlines count from here: reading recordings and importing reducers is not the FMU's fault.
             self._progress[BEGAN] = time.monotonic()
             values = {**experiment.fixed, **order.values}
-            signals = _simulate(experiment, plant, values)
+            try:
+                signals = _simulate(experiment, plant, values)
+            finally:
+                self._leaves = bool(self._surroundings.restore())
             if experiment.reduce is not None:
                 self._progress[0] = Phase.REDUCE
                 try:
                     reduced = np.atleast_1d(np.asarray(experiment.reduce(signals), dtype=np.float64))
                 except Exception as error:
-                    status, reason = Status.COST_ERROR, f"the cost raised {_sentence(error)}"
+                    ours = isinstance(error, OSError) and is_machines(error)
+                    status = Status.MACHINE if ours else Status.COST_ERROR
+                    reason = f"the cost raised {_sentence(error)}"
                 if not order.keep_signals:
                     signals = None
         except SimulationFailure as failure:
             status, reason = failure.status, failure.reason
         except MemoryError:
-            status, reason = Status.MEMORY, "memory ran out"
+            limited = self._setup.memory_limit is not None
+            status, reason = Status.MEMORY if limited else Status.MACHINE, "memory ran out"
+        except MachineError as error:
+            status, reason = Status.MACHINE, str(error)
+        except OSError as error:
+            status, reason = Status.MACHINE, str(temporary_fault(error, Path(self._setup.root).parent))
         except ThsaCosimError as error:
             status, reason = Status.LOAD_ERROR, str(error).rstrip(".")
         except Exception as error:
@@ -168,7 +200,9 @@ class Worker:
     def _experiment(self, index: int) -> tuple[Experiment, Plant]:
         if index not in self._experiments:
             with (Path(self._setup.root) / "experiments" / f"{index}.pickle").open("rb") as file:
-                self._experiments[index] = pickle.load(file)
+                experiment, description, folder = pickle.load(file)
+            own = own_copy(Path(folder), self._folder / "fmus")
+            self._experiments[index] = experiment, description, str(own)
         experiment, description, folder = self._experiments[index]
         plant = self._plants.get(folder)
         if plant is not self._live and self._live is not None:
@@ -186,6 +220,7 @@ class Worker:
             )
             self._plants[folder] = plant
         self._live = plant
+        plant.input_mode = experiment.input_mode
         return experiment, plant
 
     def _watch_memory(self) -> None:
@@ -245,25 +280,40 @@ def _to_stderr(line: str) -> None:
     os.write(2, line.encode("utf-8", "replace"))
 
 
-def parent_died(root: str) -> NoReturn:
-    """Remove the study's folder, as nobody else will, and end at once, whatever the FMU is doing."""
-    with contextlib.suppress(OSError):
-        os.chdir("/")
-    shutil.rmtree(root, ignore_errors=True)
-    if hasattr(os, "killpg"):
-        os.killpg(0, signal.SIGKILL)  # this worker and whatever its FMU has started
-    os._exit(1)
+def own_copy(folder: Path, parent: Path) -> Path:
+    """Copy an unpacked FMU (or link it, if large) into ``parent``: it may delete or write its own files."""
+    target = parent / folder.name
+    if not target.exists():
+        large = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file()) > _COPIED
+        partial = parent / f"{folder.name}.part"
+        shutil.rmtree(partial, ignore_errors=True)
+        shutil.copytree(folder, partial, copy_function=_link if large else shutil.copyfile)
+        partial.rename(target)
+    return target
+
+
+def _link(source: str, target: str) -> None:
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
+
+
+def end() -> NoReturn:
+    """End at once, whatever the FMU is doing: there is no runner any more, or no way to it."""
+    os._exit(LOST)
 
 
 def main(root: str) -> None:
-    """Entry point of the process; ``root`` is the study's folder."""
+    """Entry point of the process; ``root`` is the study's folder, for whoever looks at the process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     no_core_files()
     # The pipes move to other descriptors (not inherited by what an FMU starts); 0, 1, 2 become harmless.
-    orders, results = os.fdopen(os.dup(0), "rb"), os.dup(1)
+    pipe, results = out_of_reach(os.dup(0)), out_of_reach(os.dup(1))
+    orders = os.fdopen(pipe, "rb")
     setup = read_frame(orders)
     if not isinstance(setup, Setup):
-        parent_died(root)
+        end()
     null = os.open(os.devnull, os.O_RDONLY)
     os.dup2(null, 0)
     os.close(null)
@@ -271,7 +321,7 @@ def main(root: str) -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(line_buffering=True, errors="replace")
-    worker = Worker(setup, results)
+    worker = Worker(setup, pipe, results)
     worker.listen(orders)
     if setup.main is not None:
         from multiprocessing import spawn

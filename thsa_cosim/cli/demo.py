@@ -11,9 +11,11 @@ import click
 
 from thsa_cosim.api import DiagnoseStudy, IdentifyStudy, TuneStudy, open_study
 from thsa_cosim.cli.options import PATH, console
-from thsa_cosim.errors import InputError, StudyError
+from thsa_cosim.errors import StudyError
+from thsa_cosim.shipped import copy_example
 
-_NEEDED = ("scenarios/motor.toml", "scenarios/table4.toml", "scenarios/driven.toml", "modelica/THSA")
+_EXAMPLES = ("motor", "table4", "driven")
+_NEEDED = (*(f"scenarios/{name}.toml" for name in _EXAMPLES), "modelica/THSA")
 _EXPORTER = ("rumoca", "casadi", "ziglang")
 #: Temperatures of the motor bench that are identified: a double exponential needs four.
 _SOME, _FEW = ("m55", "m40", "m20", "p00", "p25"), ("m55", "m30", "p00", "p25")
@@ -45,14 +47,14 @@ class Step:
 def demo(output: Path, quick: bool) -> None:
     """Run the whole loop on the shipped data: export, check, identify, tune, diagnose, report.
 
-    Each step is a command of its own, which is shown with what it found. Takes a few minutes and a checkout of the
-    repository; the pages are linked from index.html in the folder.
+    Each step is a command of its own, which is shown with what it found. Takes a few minutes. The data are copied into
+    the folder, unless this is a checkout of the repository; index.html there links the pages.
     """
     from rich.text import Text
 
-    from thsa_cosim.report.index_page import Entry, write_index
+    from thsa_cosim.report.page.index import Entry, write_index
 
-    root = _checkout()
+    root = _data(output)
     can_export = all(importlib.util.find_spec(name) for name in _EXPORTER)
     steps = _steps(root, output, quick, can_export)
     output.mkdir(parents=True, exist_ok=True)
@@ -195,9 +197,10 @@ def _diagnosed(folder: Path) -> list[str]:
     return [f"verdict: {study.verdict}", *found, f"held-out errors in units of noise: {', '.join(left)}"]
 
 
-def _checkout() -> Path:
-    """Return the folder with the shipped data: here, or where an editable installation comes from."""
-    for root in (Path(), Path(__file__).parents[2]):
-        if all((root / name).exists() for name in _NEEDED):
-            return root
-    raise InputError("The demo needs the shipped scenarios: run it in a checkout of the repository.")
+def _data(output: Path) -> Path:
+    """Return the folder with the shipped data: this one in a checkout, else ``output``, into which they are copied."""
+    if all(Path(name).exists() for name in _NEEDED):
+        return Path()
+    for name in _EXAMPLES:
+        copy_example(name, output)
+    return output

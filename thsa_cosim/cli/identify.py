@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 @dry_run_option
 def identify(options: StudyOptions, export_fmu: bool | None, dry_run: bool) -> None:
     """Identify parameters from recordings as SCENARIO says, point by point over temperature."""
+    from thsa_cosim.report.files import RESULT
     from thsa_cosim.report.parameter_files import write_identified_fmu
     from thsa_cosim.report.progress import ProgressDisplay
-    from thsa_cosim.report.study import RESULT
     from thsa_cosim.scenario import Scenario, load_study
 
     loaded = load_study(options.scenario, **options.overrides)
@@ -84,8 +84,8 @@ def _one(
     scenario: "Scenario", place: Place, repeat: str, on_progress: Callable[["Progress"], None]
 ) -> _Finished:
     from thsa_cosim.identify import identify as run
-    from thsa_cosim.report.study import write_identify
-    from thsa_cosim.report.tables import print_identify
+    from thsa_cosim.report.identify.files import write_identify
+    from thsa_cosim.report.identify.tables import print_identify
 
     result = run(scenario, **place, on_progress=on_progress, command=repeat)
     files = write_identify(result, place["folder"])

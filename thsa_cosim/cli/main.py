@@ -11,12 +11,14 @@ import traceback
 import click
 
 from thsa_cosim import __version__
+from thsa_cosim.cli.check import check
 from thsa_cosim.cli.completion import completion
 from thsa_cosim.cli.demo import demo
 from thsa_cosim.cli.diagnose import diagnose
+from thsa_cosim.cli.example import example
+from thsa_cosim.cli.export import export
 from thsa_cosim.cli.identify import identify
 from thsa_cosim.cli.init import init
-from thsa_cosim.cli.models import check, export
 from thsa_cosim.cli.options import Interrupted
 from thsa_cosim.cli.report import report
 from thsa_cosim.cli.simulate import simulate
@@ -34,6 +36,7 @@ COMMANDS: tuple[click.Command, ...] = (
     diagnose,
     report,
     demo,
+    example,
     completion,
 )
 

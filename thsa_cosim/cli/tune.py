@@ -12,9 +12,10 @@ from thsa_cosim.errors import InputError, StudyError
 @dry_run_option
 def tune(options: StudyOptions, dry_run: bool) -> None:
     """Tune gains for the commands and conditions that SCENARIO describes; schedule them if it asks."""
+    from thsa_cosim.report.files import RESULT
     from thsa_cosim.report.progress import ProgressDisplay
-    from thsa_cosim.report.study import RESULT
-    from thsa_cosim.report.tune_study import print_tune, write_tune
+    from thsa_cosim.report.tune.files import write_tune
+    from thsa_cosim.report.tune.tables import print_tune
     from thsa_cosim.scenario import load_tune
     from thsa_cosim.tune import tune as run
 

@@ -1,14 +1,18 @@
 """What does a model lack? From the residual to an effect, from the effect to a better model.
 
-``superset`` exports the declared model with every effect of the catalogue (``effects``, one a file), ``screen``
-asks for linear responses of all of them, ``attribution`` refines and judges them on held-out recordings with
-thresholds by ``threshold``, ``closure`` writes the class that holds what was accepted and identifies both models.
-``structure`` says what is left, ``balance`` which equation does not close.
+Four rooms, each of which knows only those before it, and ``run`` on top:
+
+``catalogue``: what could be missing, and where. Effects, the model's slots, candidates, the superset of all of them.
+``fitting``: a model's unknowns fitted to recordings; what is left beside noise.
+``choosing``: which candidates the recordings ask for: screened, scored on held-out recordings, gated, judged.
+``explaining``: what else the recordings say: balances, dependence, empirical laws, the next experiment.
+
+``blackbox`` offers the catalogue's effects to an FMU without source; ``results`` is what all of it comes to.
 """
 
-from thsa_cosim.diagnosis.catalogue import catalogue
-from thsa_cosim.diagnosis.effect import Effect, EffectParameter, Variant
+from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Variant
+from thsa_cosim.diagnosis.catalogue.known import known_effects
 from thsa_cosim.diagnosis.results import DiagnosisResult
 from thsa_cosim.diagnosis.run import diagnose
 
-__all__ = ["DiagnosisResult", "Effect", "EffectParameter", "Variant", "catalogue", "diagnose"]
+__all__ = ["DiagnosisResult", "Effect", "EffectParameter", "Variant", "diagnose", "known_effects"]

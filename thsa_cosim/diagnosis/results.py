@@ -5,20 +5,42 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from thsa_cosim.diagnosis.structure import ChannelError
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.signals import Signals
 
-Verdict = Literal["missing-effect", "no-missing-effect", "unexplained-structure"]
+Verdict = Literal["missing-effect", "no-missing-effect", "unexplained-structure", "not-tested"]
+
+
+@dataclass(frozen=True)
+class ChannelError:
+    """A channel's error over some recordings, in its unit: ``rmse``, ``noise`` and the ``structure`` in it (rms).
+
+    ``significance``: the structure's square in standard deviations of what white noise would show.
+    """
+
+    rmse: float
+    noise: float
+    structure: float
+    significance: float
+    samples: int
 
 
 @dataclass(frozen=True)
 class Value:
-    """A fitted number in its unit, with one standard error."""
+    """A fitted number in its unit, with one standard error (infinite: none).
+
+    ``reason``: why the recordings do not determine it; "" if they do.
+    """
 
     value: float
     unit: str
     stderr: float
+    reason: str = ""
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the recordings determine it."""
+        return not self.reason
 
 
 @dataclass(frozen=True)
@@ -122,7 +144,7 @@ class Comparison:
 
 
 Errors = Mapping[str, Mapping[str, ChannelError]]
-"""Part ("fit", "validate") → channel → error."""
+"""Part ("fit", "validate") or recording → channel → error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +162,9 @@ class DiagnosisResult:
     effects: tuple[FoundEffect, ...]
     before: Errors
     after: Errors
+    recordings_before: Errors
+    """Recording → channel → error, of the declared model; ``recordings_after``: of the extended one, if any."""
+    recordings_after: Errors
     declared_before: Mapping[str, Value]
     declared_after: Mapping[str, Value]
     unexplained: float

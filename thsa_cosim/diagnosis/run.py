@@ -1,45 +1,42 @@
 """The use case: scenario → superset → attribution → closure → verdict."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from thsa_cosim import __version__
-from thsa_cosim.diagnosis.attribution import Attribution, attribute
-from thsa_cosim.diagnosis.balance import close_balances
-from thsa_cosim.diagnosis.bench import Bench, Trial
-from thsa_cosim.diagnosis.blackbox.prepare import BlackBox, wrap_black_box, write_wrapped
-from thsa_cosim.diagnosis.catalogue import catalogue, choose
-from thsa_cosim.diagnosis.closure import (
-    Identified,
-    extended_unknowns,
-    identify_model,
-    write_extended_model,
-)
-from thsa_cosim.diagnosis.dependence import dependence
-from thsa_cosim.diagnosis.empirical import LawSearch, law_of
-from thsa_cosim.diagnosis.equivalence import equivalence
-from thsa_cosim.diagnosis.experiment import separating_experiment
-from thsa_cosim.diagnosis.judge import found_effects, judged, values_of
-from thsa_cosim.diagnosis.problem import declared_unknowns, spec_of, trials_of
-from thsa_cosim.diagnosis.results import Comparison, DiagnosisResult, EmpiricalLaw, Verdict
-from thsa_cosim.diagnosis.scanning import scanner
-from thsa_cosim.diagnosis.score import Scored
-from thsa_cosim.diagnosis.structure import ChannelError, errors, worst_share
-from thsa_cosim.diagnosis.superset import Superset, open_superset
-from thsa_cosim.diagnosis.unknowns import Unknowns
+from thsa_cosim.diagnosis.blackbox.prepare import BlackBox, wrap_black_box
+from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
+from thsa_cosim.diagnosis.catalogue.candidate import Candidate
+from thsa_cosim.diagnosis.catalogue.extend import write_extended_model
+from thsa_cosim.diagnosis.catalogue.known import choose, known_effects
+from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
+from thsa_cosim.diagnosis.choosing.equivalence import equivalence
+from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, values_of
+from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
+from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
+from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
+from thsa_cosim.diagnosis.explaining.balance import close_balances
+from thsa_cosim.diagnosis.explaining.dependence import dependence
+from thsa_cosim.diagnosis.explaining.empirical import LawSearch, law_of
+from thsa_cosim.diagnosis.explaining.experiment import separating_experiment
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
+from thsa_cosim.diagnosis.fitting.fit import Fit
+from thsa_cosim.diagnosis.fitting.identified import Identified, identify_model
+from thsa_cosim.diagnosis.fitting.structure import errors, errors_by_recording
+from thsa_cosim.diagnosis.fitting.trials import Trial, spec_of, trials_of, with_fmu, with_wrapper
+from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
+from thsa_cosim.diagnosis.results import ChannelError, Comparison, DiagnosisResult, EmpiricalLaw
 from thsa_cosim.errors import StudyError
 from thsa_cosim.identify import Comparison as Compared
-from thsa_cosim.identify import ForceBalance, force_balance, open_study, study_identity
-from thsa_cosim.identify.study import describe
+from thsa_cosim.identify import ForceBalance, force_balance
 from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
+from thsa_cosim.study import describe, open_study, study_identity
 
-#: More than this share of some channel's structure left after all effects: something else is missing.
-UNEXPLAINED_SHARE = 0.25
-#: Structure (rms in standard deviations of the noise, in some channel) and its significance that count as such.
-VISIBLE, SIGNIFICANT = 0.15, 6.0
 #: The folder of the superset inside a study.
 WORK = "superset"
 
@@ -70,23 +67,31 @@ def diagnose(
     say = on_progress or (lambda _: None)
     trials = trials_of(scenario)
     unknowns = declared_unknowns(scenario, trials)
-    effects = choose(catalogue(spec.catalogue), spec.effects, f"{scenario.path}: diagnose.effects")
+    effects = choose(known_effects(spec.catalogue), spec.effects, f"{scenario.path}: diagnose.effects")
     open_study(folder, study_identity(scenario), describe(scenario, command))
+    cases = [t.case for t in trials if t.part == "fit"]
+    tested: Superset | BlackBox
     if spec.model is None:
         say("measuring the drive of the black box")
-        tested: Superset | BlackBox = wrap_black_box(scenario, trials, effects.values())
+        box = tested = wrap_black_box(scenario, cases, effects.values())
+        declared = driven = with_wrapper(trials, tested.wrapper)
     else:
         say("exporting the superset of all effects")
-        tested = open_superset(scenario, spec.model, trials, effects.values(), folder / WORK)
-    box = tested if isinstance(tested, BlackBox) else None
+        box, tested = None, open_superset(scenario, spec.model, cases, effects.values(), folder / WORK)
+        declared, driven = trials, with_fmu(trials, tested.fmu)
     say("identifying the declared model from the drawing")
-    declared = trials if box is None else box.with_effects(())
     before = identify_model(
-        scenario.fmu.path, declared, unknowns, [unknowns.start], scenario.simulation, workers, cluster
+        scenario.fmu.path,
+        declared,
+        unknowns,
+        [unknowns.start],
+        scenario.simulation,
+        workers,
+        cluster,
     )
-    with open_runner(scenario.simulation, [t.experiment for t in tested.trials], workers, cluster) as runner:
-        bench = Bench(runner, tested.trials)
-        scan = scanner(bench, tested.slots, tested.signals_at)
+    with open_runner(scenario.simulation, [t.experiment for t in driven], workers, cluster) as runner:
+        bench = Bench(runner, driven)
+        scan = wave_number_finder(bench, tested.slots, tested.signals_at)
         start = before.fit.vector
         found = attribute(
             bench, unknowns, tested.candidates, scan, start=start, seed=scenario.seed, most=spec.most, say=say
@@ -95,7 +100,19 @@ def diagnose(
         reason = next(iter(bench.failures), "no run succeeded")
         raise StudyError(f"{scenario.path}: the model with all effects cannot be simulated: {reason}")
     return _Closing(
-        scenario, spec, folder, workers, cluster, trials, unknowns, before, found, bench, say, box
+        scenario,
+        spec,
+        folder,
+        workers,
+        cluster,
+        trials,
+        unknowns,
+        before,
+        found,
+        bench,
+        say,
+        tuple(effects),
+        box,
     ).result()
 
 
@@ -114,17 +131,20 @@ class _Closing:
     found: Attribution
     bench: Bench
     say: Say
+    effects: tuple[str, ...]
     box: BlackBox | None = None
 
     def result(self) -> DiagnosisResult:
         """Identify the extended model on its own FMU as the declared one was, and judge both."""
         scenario, found, before = self.scenario, self.found, self._declared()
-        accepted, notes, after = found.accepted, list(found.notes), before
+        accepted, notes, after = found.accepted, [*self.bench.notes, *found.notes], before
         model: Path | None = None
         extended: Path | None = None
         wrapper: Path | None = None
         if self.box is not None:
             notes += self.box.notes
+        if not _tested(found):
+            notes.append(_untested(found, self.effects))
         if accepted:
             wider = extended_unknowns(self.unknowns, accepted)
             hint = found.final.at(wider.names)
@@ -132,13 +152,16 @@ class _Closing:
                 self.say(f"exporting the model with {', '.join(s.candidate.name for s in accepted)}")
                 assert self.spec.model is not None
                 model, extended = write_extended_model(
-                    self.folder, self.spec.model, self.spec.package, accepted, found.final
+                    self.folder, self.spec.model, self.spec.package, *_built(accepted, found.final)
                 )
             self.say("identifying the extended model from the drawing")
             after = self._identify(extended or scenario.fmu.path, wider, [wider.start, hint], accepted)
             if self.box is not None:
-                wrapper = write_wrapped(self.folder, self.box, accepted, after.fit)
-        share, verdict = self._verdict(before, after, accepted)
+                values = {**after.trials[0].case.fixed, **after.fit.unknowns.named(after.fit.vector)}
+                wrapper = write_wrapper(self.folder, scenario.fmu.path, self.box.wrapper, values)
+        held_out = tuple(t for t in self.trials if t.part == "validate")
+        share = left_over(held_out, before.validate, after.validate)
+        verdict = verdict_on(errors(held_out, after.validate), len(accepted), _tested(found))
         law: EmpiricalLaw | None = None
         if verdict == "unexplained-structure" and self.box is None:
             self.say("looking for an empirical law")
@@ -156,7 +179,6 @@ class _Closing:
         for identified in (before, after) if changed else (before,):
             for reason, count in identified.failures.items():
                 counts[reason] = counts.get(reason, 0) + count
-        inflation = max(1.0, after.fit.misfit / after.fit.residual.size)
         return DiagnosisResult(
             title=scenario.title or scenario.path.stem,
             status="complete",
@@ -166,11 +188,13 @@ class _Closing:
             fmu=scenario.fmu.path,
             fmu_sha256=scenario.fmu.sha256,
             verdict=verdict,
-            effects=found_effects(found, after.fit, inflation),
+            effects=found_effects(found, after.fit),
             before=_errors(before),
             after=_errors(after) if changed else {"fit": {}, "validate": {}},
+            recordings_before=_errors_by_recording(before),
+            recordings_after=_errors_by_recording(after) if changed else {},
             declared_before=values_of(before.fit, declared=True),
-            declared_after=values_of(after.fit, declared=True, inflation=inflation),
+            declared_after=values_of(after.fit, declared=True),
             unexplained=share,
             model=model,
             extended_fmu=extended,
@@ -207,7 +231,7 @@ class _Closing:
         assert self.spec.model is not None
         added = (*self.found.accepted, *terms.accepted)
         model, extended = write_extended_model(
-            self.folder, self.spec.model, self.spec.package, added, terms.final
+            self.folder, self.spec.model, self.spec.package, *_built(added, terms.final)
         )
         wider = extended_unknowns(self.unknowns, added)
         hint = terms.final.at(wider.names)
@@ -216,26 +240,18 @@ class _Closing:
     def _identify(
         self, fmu: Path, unknowns: Unknowns, starts: Sequence[np.ndarray], accepted: Sequence[Scored]
     ) -> Identified:
-        trials = self.trials if self.box is None else self.box.with_effects(accepted)
+        trials = self.trials
+        if self.box is not None:
+            trials = with_wrapper(trials, self.box.wrapper, fixed_shapes(accepted))
         return identify_model(
             fmu, trials, unknowns, starts, self.scenario.simulation, self.workers, self.cluster
         )
 
-    def _verdict(
-        self, before: Identified, after: Identified, accepted: Sequence[Scored]
-    ) -> tuple[float, Verdict]:
-        """Share of the held-out structure that is left in the worst channel, and the verdict."""
-        held_out = tuple(t for t in self.trials if t.part == "validate")
-        visible = is_visible(errors(held_out, after.validate))
-        share = worst_share(held_out, before.validate, after.validate) if visible else 0.0
-        if accepted and not (visible and share > UNEXPLAINED_SHARE):
-            return share, "missing-effect"
-        return share, "unexplained-structure" if visible else "no-missing-effect"
 
-
-def is_visible(found: Mapping[str, ChannelError]) -> bool:
-    """Whether some channel holds structure that is neither chance nor too small to matter."""
-    return any(e.structure > VISIBLE * e.noise and e.significance > SIGNIFICANT for e in found.values())
+def _built(accepted: Sequence[Scored], final: Fit) -> tuple[list[Candidate], dict[str, float]]:
+    """The candidates of an extended model and the values that it starts with."""
+    values = {**final.unknowns.named(final.vector), **fixed_shapes(accepted)}
+    return [s.candidate for s in accepted], values
 
 
 def _errors(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
@@ -244,6 +260,28 @@ def _errors(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
         part: errors(tuple(t for t in identified.trials if t.part == part), residual)
         for part, residual in parts.items()
     }
+
+
+def _errors_by_recording(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
+    found: dict[str, Mapping[str, ChannelError]] = {}
+    for part, residual in (("fit", identified.fit.residual), ("validate", identified.validate)):
+        trials = tuple(t for t in identified.trials if t.part == part)
+        for name, channels in errors_by_recording(trials, residual).items():
+            found[f"{part}/{name}" if name in found else name] = channels
+    return found
+
+
+def _tested(found: Attribution) -> int:
+    """How many proposals the recordings could have told from nothing."""
+    return sum(p.is_testable for r in found.rounds[:1] for p in r.proposals)
+
+
+def _untested(found: Attribution, effects: Iterable[str]) -> str:
+    """Why no effect could be tried."""
+    names = ", ".join(effects)
+    if not any(r.proposals for r in found.rounds):
+        return f"no effect could be tried: the model has no place for {names}"
+    return f"no effect could be tried: nothing in the fit recordings depends on {names}"
 
 
 def _comparisons(before: Identified, after: Identified | None) -> tuple[Comparison, ...]:

@@ -5,9 +5,9 @@
 ``text``     the commented TOML file
 """
 
-from thsa_cosim.draft.columns import FoundColumn, find_columns, time_column
 from thsa_cosim.draft.match import Match, match_columns
 from thsa_cosim.draft.text import Draft, draft_from_columns, draft_scenario
+from thsa_cosim.recordings.columns import FoundColumn, find_columns, time_column
 
 __all__ = [
     "Draft",

@@ -12,8 +12,8 @@ from difflib import SequenceMatcher
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from thsa_cosim.draft.columns import FoundColumn, words
 from thsa_cosim.fmu import Variable
+from thsa_cosim.recordings.columns import FoundColumn, words
 from thsa_cosim.units import is_unit, same_dimension
 
 _EMPTY_WORDS = {

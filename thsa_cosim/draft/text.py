@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from thsa_cosim.draft.columns import FoundColumn, find_columns, time_column
 from thsa_cosim.draft.match import Match, match_columns
 from thsa_cosim.fmu import FmuDescription, Variable
+from thsa_cosim.recordings.columns import FoundColumn, find_columns, time_column
 from thsa_cosim.units import same_dimension
 
 _MOST_PARAMETERS = 60

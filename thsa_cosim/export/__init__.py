@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from thsa_cosim.errors import MissingExtraError, ModelicaError, ParameterError, did_you_mean
+from thsa_cosim.shipped import modelica_package
 
 __all__ = ["export_fmu"]
 
@@ -18,7 +19,7 @@ __all__ = ["export_fmu"]
 def export_fmu(
     model: str,
     *,
-    package: Path = Path("modelica/THSA"),
+    package: Path | None = None,
     fmi: int = 2,
     output: Path | None = None,
     compiler: str = "native",
@@ -32,7 +33,7 @@ def export_fmu(
     model:
         Class name (``THSA.Actuator`` or ``Actuator``) or the path of a ``.mo`` file.
     package:
-        Folder of the Modelica package.
+        Folder of the Modelica package; default ``modelica/THSA`` here, else the one that is shipped.
     fmi:
         FMI version, 2 or 3.
     output:
@@ -55,6 +56,7 @@ def export_fmu(
     """
     if fmi not in (2, 3):
         raise ModelicaError(f"FMI version {fmi} is not supported; choose 2 or 3.")
+    package = package or modelica_package()
     if compiler == "omc":
         from thsa_cosim.export.openmodelica import export_with_openmodelica
 

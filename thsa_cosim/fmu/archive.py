@@ -8,6 +8,7 @@ import zlib
 from pathlib import Path, PurePosixPath
 
 from thsa_cosim.errors import FmuError, did_you_mean_path
+from thsa_cosim.fmu.machine import is_machines, temporary_fault
 
 MAXIMUM_UNPACKED_BYTES = 8 * 2**30
 """Above this an archive is taken for a zip bomb."""
@@ -59,6 +60,7 @@ def unpack(path: Path, folder: Path) -> Path:
     """Unpack the FMU ``path`` into ``folder`` (created) and return it.
 
     Nothing is written if any entry points outside ``folder``; a folder begun is removed on failure.
+    MachineError if the disk, and not the archive, is at fault.
     """
     with open_archive(path) as archive:
         check_archive(path, archive)
@@ -74,5 +76,7 @@ def unpack(path: Path, folder: Path) -> Path:
             EOFError,
         ) as error:
             shutil.rmtree(folder, ignore_errors=True)
+            if isinstance(error, OSError) and (is_machines(error) or not folder.parent.is_dir()):
+                raise temporary_fault(error) from None
             raise FmuError(f"{path} cannot be unpacked ({error}).") from None
     return folder

@@ -3,7 +3,7 @@
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -99,6 +99,8 @@ class FmuDescription:
     event_indicators: int = 0
     state_references: tuple[tuple[int, int], ...] = ()
     """(state, its derivative) as value references, in the order of the state vector; empty if unknown."""
+    feedthrough: Mapping[str, tuple[str, ...] | None] = field(default_factory=dict)
+    """What each output depends on directly, by name (ModelStructure, FMI 2.0.4 clause 2.2.8); None: not said."""
 
     @property
     def inputs(self) -> tuple[Variable, ...]:
@@ -179,6 +181,12 @@ def read_description(path: Path | str) -> FmuDescription:
         states=len(raw.derivatives) or int(raw.numberOfContinuousStates or 0),
         event_indicators=len(raw.eventIndicators) or int(raw.numberOfEventIndicators or 0),
         state_references=_state_references(raw),
+        feedthrough={
+            unknown.variable.name: None
+            if unknown.dependencies is None
+            else tuple(known.name for known in unknown.dependencies)
+            for unknown in raw.outputs
+        },
     )
 
 

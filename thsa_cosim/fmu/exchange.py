@@ -7,7 +7,6 @@ event indicators are compared after every step as well (an indicator that return
 root); time and step events follow FMI 2.0.4 clause 3.2 and FMI 3.0.2 clause 3.2.
 """
 
-import ctypes
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -65,47 +64,15 @@ class _Run:
         self.next_row = 0
         self.next_event: float | None = None
         self.ends = False
-        self._derivatives = "GetDerivatives" if instance.prefix == "fmi2" else "GetContinuousStateDerivatives"
-        # The right-hand side is called some thousand times per second: functions and buffers are bound once.
-        pointer, function, prefix = ctypes.c_void_p, instance.library.function, instance.prefix
-        self._x, self._dx, self._z = np.zeros(self.nx), np.zeros(self.nx), np.zeros(self.nz)
-        self._x_address, self._dx_address = self._x.ctypes.data, self._dx.ctypes.data
-        self._set_time = function(f"{prefix}SetTime", pointer, ctypes.c_double)
-        self._set_states = function(f"{prefix}SetContinuousStates", pointer, pointer, ctypes.c_size_t)
-        self._get_derivatives = function(f"{prefix}{self._derivatives}", pointer, pointer, ctypes.c_size_t)
-        self._continuous = [
-            (
-                channel,
-                np.zeros(len(channel.references), dtype=channel.dtype),
-                list(channel.columns),
-                instance.value_function("Set", channel.suffix),
-            )
-            for channel in plan.input_channels
-            if channel.dtype.kind == "f"
-        ]
-        """Outside of Event Mode only continuous inputs may change."""
+        self._z = np.zeros(self.nz)
+        self.point = instance.point(plan.input_channels)
 
     # -- the FMU at one point -------------------------------------------------------------------------
     def place(self, time: float, states: FloatArray) -> None:
         """Give the FMU a time, states and the inputs there."""
-        check, handle = self.instance.check, self.instance.handle
         self.progress[1] = time
-        if code := self._set_time(handle, time):
-            check(code, "SetTime", time)
-        if self.nx:
-            self._x[:] = states
-            if code := self._set_states(handle, self._x_address, self.nx):
-                check(code, "SetContinuousStates", time)
-        if self._continuous:
-            segment = self.segment
-            values = segment.value + segment.slope * (time - segment.start)
-            for channel, buffer, columns, setter in self._continuous:
-                buffer[:] = values[columns]
-                code = self.instance.access(
-                    setter, channel.references.ctypes.data, len(buffer), buffer.ctypes.data
-                )
-                if code:
-                    check(code, f"Set{channel.suffix}", time)
+        segment = self.segment
+        self.point.place(time, states, segment.value + segment.slope * (time - segment.start))
 
     def apply_inputs(self, time: float) -> None:
         """Set all inputs to u(time), in Event Mode or before."""
@@ -119,10 +86,8 @@ class _Run:
         if not self.nx:
             out[:] = 0.0
             return
-        if code := self._get_derivatives(self.instance.handle, self._dx_address, self.nx):
-            self.instance.check(code, self._derivatives, time)
-        out[:] = self._dx
-        if not np.isfinite(self._dx).all():
+        out[:] = self.point.derivatives(time)
+        if not np.isfinite(out).all():
             i = int(np.argmin(np.isfinite(out)))
             reason = f"the derivative of state {i + 1} became {out[i]} at t = {time:.9g} s"
             raise SimulationFailure(Status.NOT_FINITE, reason)
@@ -207,7 +172,7 @@ class _Run:
             atol=self.absolute_tolerance(),
             roots=self.roots,
             root_count=self.nz,
-            jacobian=self.jacobian if self._has_jacobian() else None,
+            jacobian=self.jacobian if instance.has_jacobian else None,
         )
         try:
             self.record(t, solver.states)
@@ -269,22 +234,10 @@ class _Run:
         return jumps
 
     # -- exact Jacobian -------------------------------------------------------------------------------
-    def _has_jacobian(self) -> bool:
-        description = self.instance.description
-        return bool(
-            self.nx
-            and description.capabilities.get("providesDirectionalDerivative")
-            and len(description.state_references) == self.nx
-        )
-
     def jacobian(self, time: float, states: FloatArray, out: FloatArray) -> None:
-        """df/dx column by column through directional derivatives."""
+        """df/dx for CVODE."""
         self.place(time, states)
-        column = np.empty(self.nx)
-        references = np.array(self.instance.description.state_references, dtype=np.uint32)
-        for j in range(self.nx):
-            self.instance.directional_derivative(references[:, 1], references[j : j + 1, 0], column)
-            out[:, j] = column
+        self.instance.jacobian(out)
 
 
 def integrate(instance: Instance, plan: Plan, progress: FloatArray, tolerance: float | None) -> Signals:

@@ -26,6 +26,8 @@ class Status(StrEnum):
     """The FMU's library or an instance of it cannot be created."""
     BAD_ARCHIVE = "bad-archive"
     """The file is no FMU archive, or one whose entries point outside of it."""
+    MACHINE = "machine"
+    """The machine's fault (disk, memory): a runner tries again, then raises MachineError; no job ends so."""
     COST_ERROR = "cost-error"
     """The simulation succeeded but reducing it to a cost raised."""
 

@@ -15,6 +15,7 @@ from thsa_cosim.errors import ParameterError
 from thsa_cosim.fmu.description import FmuDescription, Variable
 from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.native import Library, Messages, MessageSink, failure, library_path, load_library
+from thsa_cosim.fmu.point import InstancePoint, Point
 from thsa_cosim.signals import FloatArray
 
 
@@ -76,6 +77,9 @@ class Instance(ABC):
         self.library: Library = load_library(library_path(folder, description, identifier or ""))
         self.resources = folder / "resources"
         self.handle = 0
+        self.input_mode: str | None = None
+        """How linear inputs are given, see ``inputs.input_mode``; None: as trusted."""
+        self._start: tuple[Sequence[Channel], FloatArray] = (), np.empty(0)
         self.is_dead = False
         """After fmiXFatal nothing may be called any more, not even FreeInstance."""
 
@@ -162,6 +166,18 @@ class Instance(ABC):
             self.check(code, f"Get{channel.suffix}")
             out[list(channel.columns)] = data
 
+    def set_start(self, channels: Sequence[Channel], values: FloatArray) -> None:
+        """Set start values of a new or reset instance.
+
+        Some tools (20-sim) overwrite them when the experiment is set up; ``initialize_begin`` sets them once more.
+        """
+        self._start = channels, values
+        self.set_values(channels, values)
+
+    def set_start_again(self) -> None:
+        """Set the start values a second time, where the FMI still allows all of them."""
+        self.set_values(*self._start)
+
     def initialize_end(self) -> None:
         """Leave Initialization Mode."""
         self.call("ExitInitializationMode")
@@ -203,3 +219,25 @@ class Instance(ABC):
     def vector(self, name: str, values: FloatArray) -> None:
         """Call a function that reads or writes a vector of Reals, e.g. GetContinuousStates."""
         self.call(name, (ctypes.c_void_p, values.ctypes.data), (ctypes.c_size_t, len(values)))
+
+    def point(self, input_channels: Sequence[Channel]) -> Point:
+        """Return the instance as the integrator sees it."""
+        return InstancePoint(self, input_channels)
+
+    @property
+    def has_jacobian(self) -> bool:
+        """Whether ``jacobian`` can be called."""
+        description = self.description
+        return bool(
+            description.states
+            and description.capabilities.get("providesDirectionalDerivative")
+            and len(description.state_references) == description.states
+        )
+
+    def jacobian(self, out: FloatArray) -> None:
+        """Write df/dx (n, n) at the present point into ``out``, column by column."""
+        references = np.array(self.description.state_references, dtype=np.uint32)
+        column = np.empty(len(references))
+        for j in range(len(references)):
+            self.directional_derivative(references[:, 1], references[j : j + 1, 0], column)
+            out[:, j] = column

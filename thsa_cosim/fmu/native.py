@@ -33,7 +33,7 @@ def library_path(folder: Path, description: FmuDescription, identifier: str) -> 
     folders = platform_folders(description.fmi_version)
     for name in folders:
         candidate = folder / "binaries" / name / (identifier + extension)
-        if candidate.is_file():
+        if candidate in _loaded or candidate.is_file():
             return candidate
     has = ", ".join(description.platforms) or "none"
     raise SimulationFailure(

@@ -7,6 +7,8 @@ import tempfile
 from pathlib import Path
 from typing import IO
 
+from thsa_cosim.fmu.machine import temporary_fault
+
 _PREFIX = "thsa-cosim-"
 _LOCK = "in-use"
 
@@ -19,9 +21,12 @@ class ScratchFolder:
     """
 
     def __init__(self) -> None:
-        """Make the folder; remove those whose owners are gone."""
+        """Make the folder; remove those whose owners are gone. MachineError if there is no place for it."""
         _sweep()
-        self.path = Path(tempfile.mkdtemp(prefix=_PREFIX))
+        try:
+            self.path = Path(tempfile.mkdtemp(prefix=_PREFIX))
+        except OSError as error:
+            raise temporary_fault(error) from None
         self._lock = _take_lock(self.path)
 
     def remove(self) -> None:

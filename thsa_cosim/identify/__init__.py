@@ -8,7 +8,6 @@
 ``over_temperature``  points → laws
 ``compare``           simulated against measured
 ``force``             the force residual
-``study``             the study folder
 ``results``           what comes out
 """
 
@@ -23,8 +22,7 @@ from thsa_cosim.identify.results import (
     PointResult,
     Progress,
 )
-from thsa_cosim.identify.run import identify, study_identity
-from thsa_cosim.identify.study import describe, open_study
+from thsa_cosim.identify.run import identify
 
 __all__ = [
     "ChannelError",
@@ -35,9 +33,6 @@ __all__ = [
     "LawResult",
     "PointResult",
     "Progress",
-    "describe",
     "force_balance",
     "identify",
-    "open_study",
-    "study_identity",
 ]

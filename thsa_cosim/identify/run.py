@@ -1,7 +1,6 @@
 """The use case: scenario → searches over a runner → parameters per point → laws → result."""
 
-import hashlib
-import json
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
@@ -26,10 +25,11 @@ from thsa_cosim.identify.results import (
     PointResult,
     Progress,
 )
-from thsa_cosim.identify.study import describe, open_study
+from thsa_cosim.identify.silent import note_on, silent_parameters
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario, open_runner
 from thsa_cosim.search import EvolutionSettings, Generation
+from thsa_cosim.study import describe, open_study, study_identity
 
 JOURNAL = "journal.csv"
 OnProgress = Callable[[Progress], None]
@@ -63,8 +63,9 @@ def identify(
     points = [build_point(scenario, p, known.get(p.temperature_degC)) for p in scenario.points]
     held_out = _held_out_cases(scenario)
     samples = {point.label: point.samples for point in points}
-    identity = {**study_identity(scenario), "kind": "identify"}
-    open_study(folder, identity, {**describe(scenario, command), "samples": samples})
+    open_study(
+        folder, study_identity(scenario, "identify"), {**describe(scenario, command), "samples": samples}
+    )
     names = tuple(dict.fromkeys(name for point in points for name in point.space.names))
     channels = points[0].channel_names
     study = _Study(scenario, points, held_out)
@@ -72,12 +73,17 @@ def identify(
         try:
             experiments = _experiments(points, held_out)
             with open_runner(scenario.simulation, experiments, workers, cluster) as runner:
+                study.note(runner.notes)
                 evaluator = Evaluator(runner, journal, points, names, channels, on_progress)
+                study.try_parameters(evaluator)
                 study.search(evaluator)
                 study.validate(runner)
         except KeyboardInterrupt:
             study.interrupted = True
     return study.result()
+
+
+_log = logging.getLogger(__name__)
 
 
 class _Study:
@@ -98,6 +104,19 @@ class _Study:
         self._notes: list[str] = []
         self._evaluator: Evaluator | None = None
 
+    def note(self, notes: Sequence[str]) -> None:
+        """Take sentences for the result."""
+        self._notes += notes
+
+    def try_parameters(self, evaluator: Evaluator) -> None:
+        """Name the parameters that do nothing, before any search."""
+        silent = silent_parameters(self._points[0], lambda request: evaluator.serve([(0, request)])[0])
+        if silent:
+            sentences = note_on(silent)
+            self.note(sentences)
+            for sentence in sentences:
+                _log.warning(sentence)
+
     def search(self, evaluator: Evaluator) -> None:
         """Search all points at once; what is finished is kept whatever happens to the rest."""
         self._evaluator = evaluator
@@ -117,7 +136,13 @@ class _Study:
             def on_generation(generation: Generation) -> None:
                 evaluator.note_generation(index, generation.index)
 
-            return lambda ask: search_point(self._points[index], settings, spec.polish, ask, on_generation)
+            def on_evolution() -> None:
+                evaluator.expect_evolution(index, spec)
+
+            point = self._points[index]
+            return lambda ask: search_point(
+                point, spec.method, settings, spec.polish, ask, on_generation, on_evolution
+            )
 
         tasks = [task(index) for index in range(len(self._points))]
         with closing(interleave(tasks, evaluator.serve)) as finished:
@@ -223,46 +248,6 @@ class _Study:
             for case, recording, signals in zip(problem.cases, recordings, found.signals, strict=False):
                 comparisons.append(compare(case, recording, "fit", signals))
         return comparisons
-
-
-def study_identity(scenario: Scenario) -> dict[str, object]:
-    """What makes two runs the same study: digests of scenario, FMU and recordings, and the seed."""
-    content = {
-        "title": scenario.title,
-        "fixed": dict(scenario.fixed),
-        "points": [dict(point.fixed) for point in scenario.points],
-        "parameters": [asdict(p) for p in scenario.parameters.parameters],
-        "laws": {name: asdict(law) for name, law in scenario.laws.items()},
-        "cost": asdict(scenario.cost),
-        "search": asdict(scenario.search),
-        "simulation": {**asdict(scenario.simulation), "deadline": None, "memory_mb": None},
-        "inputs": scenario.inputs,
-        "round_to": scenario.round_to,
-    }
-    text = json.dumps(content, sort_keys=True, default=str)
-    recordings = {
-        "fit": [_digest(recording) for recording in scenario.fit],
-        "validate": [_digest(recording) for recording in scenario.validate],
-    }
-    return {
-        "kind": scenario.kind,
-        "scenario": hashlib.sha256(text.encode()).hexdigest(),
-        "fmu": scenario.fmu.sha256,
-        "recordings": recordings,
-        "seed": scenario.seed,
-    }
-
-
-def _digest(recording: Recording) -> str:
-    """Digest of a recording as it is used: its samples after renaming, conversion and cutting."""
-    digest = hashlib.sha256()
-    signals = recording.signals
-    digest.update(signals.time.tobytes())
-    for name in signals.names:
-        digest.update(name.encode())
-        digest.update(signals[name].tobytes())
-    digest.update(str(recording.lead_in).encode())
-    return digest.hexdigest()
 
 
 def _held_out_cases(scenario: Scenario) -> list[tuple[Case, Recording]]:

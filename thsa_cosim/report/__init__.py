@@ -1,11 +1,9 @@
-"""Results → files and tables. Nothing in the core imports this room.
+"""Results → files, tables and pages. Nothing in the core imports this room.
 
-``result_json``
-    the study folder's ``result.json`` and CSV files.
-``tables``
-    what the command line prints (rich).
-``plots``
-    figures as PNG files (matplotlib).
-``study``
-    all of them for a finished or interrupted identification.
+``folder``           what a study folder holds, finished or running: the one reader
+``identify``, ``tune``, ``diagnose``, ``simulate``, ``staged``: what each kind leaves, prints and shows
+``parts``            what pages of all kinds are made of
+``page``             one HTML page per study
+``files``, ``signal_files``, ``parameter_files``: writing
+``progress``         what the terminal shows while a study runs
 """

@@ -7,10 +7,13 @@ from typing import Any
 from rich.console import Console
 
 from thsa_cosim import __version__
+from thsa_cosim.report.files import RESULT, write_json
+from thsa_cosim.report.identify.files import write_identify
+from thsa_cosim.report.identify.result import identify_to_dict
+from thsa_cosim.report.identify.tables import print_identify
 from thsa_cosim.report.parameter_files import write_parameter_set
-from thsa_cosim.report.result_json import identify_to_dict, write_json
-from thsa_cosim.report.study import RESULT, write_identify, write_simulate
-from thsa_cosim.report.tables import print_identify, print_simulate
+from thsa_cosim.report.simulate.files import write_simulate
+from thsa_cosim.report.simulate.tables import print_simulate
 from thsa_cosim.staged import StagedResult
 
 

@@ -24,6 +24,7 @@ from thsa_cosim.scenario.model import (
 from thsa_cosim.scenario.runner import open_runner
 from thsa_cosim.scenario.schema import KINDS
 from thsa_cosim.scenario.stages import Stage, StagedScenario, hand_on, load_study
+from thsa_cosim.scenario.table import Table
 from thsa_cosim.scenario.tune_load import load_tune
 from thsa_cosim.scenario.tune_model import TuneScenario
 
@@ -41,6 +42,7 @@ __all__ = [
     "SimulationSpec",
     "Stage",
     "StagedScenario",
+    "Table",
     "TemperaturePoint",
     "TuneScenario",
     "hand_on",

@@ -19,6 +19,7 @@ from thsa_cosim.scenario.schema import (
     SimulateTable,
 )
 from thsa_cosim.scenario.tune_schema import TuneTable
+from thsa_cosim.shipped import modelica_package
 from thsa_cosim.ssv import read_ssv
 from thsa_cosim.units import convert
 
@@ -165,10 +166,8 @@ def diagnosis(
         known = (*inputs, *measured, *(p.name for p in table.parameters))
         for text in (balance.left, *balance.terms):
             parse_formula(text, known, f"diagnose.balances[{balance.name}]")
-    package, own = (
-        path.parent / spec.package,
-        None if spec.catalogue is None else path.parent / spec.catalogue,
-    )
+    package = modelica_package(path.parent / "..") if spec.package is None else path.parent / spec.package
+    own = None if spec.catalogue is None else path.parent / spec.catalogue
     if own is not None and not own.is_dir():
         raise ScenarioError(
             f"diagnose.catalogue: there is no folder {own}; correct the path.{did_you_mean_path(own)}"

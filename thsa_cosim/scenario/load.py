@@ -141,6 +141,7 @@ def _resolve(
     scenario = Scenario(
         kind=table.kind,
         path=path,
+        table=table,
         title=table.title,
         seed=table.seed if seed is None else seed,
         fmu=description,

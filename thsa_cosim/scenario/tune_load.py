@@ -98,6 +98,7 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
     requirements = tuple(_requirement(k, r, table, command, fmu) for k, r in enumerate(table.requirements))
     return TuneScenario(
         path=path,
+        table=table,
         title=table.title or path.stem,
         seed=table.seed if seed is None else seed,
         fmu=fmu,
@@ -125,7 +126,7 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         pareto=pareto_spec(table),
         line=line_spec(table, space),
         surface=surface_spec(table, space),
-        search=SearchSpec(**table.search.model_dump(), polish=False),
+        search=SearchSpec(method="differential-evolution", **table.search.model_dump(), polish=False),
         simulation=_simulation(table),
     )
 

@@ -9,6 +9,7 @@ from typing import Literal
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.scenario.model import SearchSpec, SimulationSpec
+from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import convert
 
@@ -222,10 +223,12 @@ class TuneScenario:
     """What to tune, and for what.
 
     ``before`` and ``compare`` hold values of all parameters in the parameters' units; they may lie outside the
-    bounds. ``fixed`` are FMU start values (FMU units).
+    bounds. ``fixed`` are FMU start values (FMU units). ``table`` is the file as it was written, checked, with its
+    defaults.
     """
 
     path: Path
+    table: TuneTable
     title: str
     seed: int
     fmu: FmuDescription

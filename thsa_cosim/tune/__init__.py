@@ -10,7 +10,6 @@
 ``population``  the population's path, and the line it draws towards
 ``pareto``      non-dominated gains
 ``schedule``    gains over conditions: smoothing and interpolation
-``study``       identity of a study, and its runner
 ``results``     what comes out
 """
 
@@ -25,7 +24,6 @@ from thsa_cosim.tune.results import (
 )
 from thsa_cosim.tune.run import tune
 from thsa_cosim.tune.schedule import GainSchedule
-from thsa_cosim.tune.study import study_identity
 
 __all__ = [
     "GainSchedule",
@@ -36,6 +34,5 @@ __all__ = [
     "Scored",
     "Surface",
     "TuneResult",
-    "study_identity",
     "tune",
 ]

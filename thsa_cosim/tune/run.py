@@ -10,12 +10,13 @@ import numpy as np
 from thsa_cosim import __version__
 from thsa_cosim.batch import Journal
 from thsa_cosim.errors import StudyError
-from thsa_cosim.identify import Progress, describe, open_study
+from thsa_cosim.identify import Progress
 from thsa_cosim.identify.interleave import interleave
 from thsa_cosim.scenario import TuneScenario, open_runner
 from thsa_cosim.scenario.tune_model import combinations
 from thsa_cosim.search import EvolutionResult, EvolutionSettings, Generation, evolve
 from thsa_cosim.signals import FloatArray
+from thsa_cosim.study import describe, open_study, study_identity
 from thsa_cosim.tune.combine import INFEASIBLE, equation_7
 from thsa_cosim.tune.evaluate import Evaluation, Evaluator, Reply, Request, cases_of
 from thsa_cosim.tune.pareto import front
@@ -32,7 +33,6 @@ from thsa_cosim.tune.results import (
     TuneResult,
 )
 from thsa_cosim.tune.schedule import GainSchedule, smooth
-from thsa_cosim.tune.study import study_identity
 
 JOURNAL = "journal.csv"
 #: The smoothing is divided by 4 until no node breaks a hard requirement, so often at most.
@@ -76,6 +76,7 @@ def tune(
         try:
             experiments = [case.experiment for case in cases_of([*groups, study.check])]
             with open_runner(scenario.simulation, experiments, workers, cluster) as runner:
+                study.notes += runner.notes
                 evaluator = Evaluator(scenario, runner, journal, groups, names, on_progress)
                 study.run(evaluator, journal)
         except KeyboardInterrupt:

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from thsa_cosim.diagnosis.effect import Effect, Variant
-from thsa_cosim.diagnosis.slots import Slot
+from thsa_cosim.diagnosis.catalogue.effect import Effect, Variant
+from thsa_cosim.diagnosis.catalogue.slots import Slot
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.scenario import BlackBoxSpec
 

@@ -2,20 +2,15 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Status
-from thsa_cosim.diagnosis.bench import Trial
 from thsa_cosim.diagnosis.blackbox.drive import Drive, integral_of, measure_drive
 from thsa_cosim.diagnosis.blackbox.places import WrapperSlot, find_places, fitted_to, slot_of
-from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
 from thsa_cosim.diagnosis.blackbox.wrapper import EffectWrapper, Term
-from thsa_cosim.diagnosis.candidate import Candidate, candidates_of
-from thsa_cosim.diagnosis.effect import Effect
-from thsa_cosim.diagnosis.fit import Fit
-from thsa_cosim.diagnosis.score import Scored
+from thsa_cosim.diagnosis.catalogue.candidate import Candidate, candidates_of
+from thsa_cosim.diagnosis.catalogue.effect import Effect
 from thsa_cosim.errors import StudyError
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.identify.problem import Case
@@ -28,38 +23,25 @@ STEP = 0.01
 
 @dataclass(frozen=True, eq=False)
 class BlackBox:
-    """The recordings driving the wrapped FMU, the candidates, and what could not be offered, in sentences."""
+    """The FMU's wrapper, the candidates, and what could not be offered, in sentences."""
 
-    trials: tuple[Trial, ...]
     wrapper: EffectWrapper
     slots: tuple[WrapperSlot, ...]
     candidates: tuple[Candidate, ...]
     notes: tuple[str, ...]
     signals_at: Callable[[Mapping[str, Mapping[str, float]]], Mapping[str, Signals]]
 
-    def with_effects(self, accepted: Sequence[Scored]) -> tuple[Trial, ...]:
-        """The recordings with the shapes that no fit changes at the values of the accepted proposals."""
-        fixed = {
-            p.variable: s.proposal.shapes[p.name] for s in accepted for p in s.candidate.parameters if p.fixed
-        }
-        return tuple(replace(t, case=replace(t.case, fixed={**t.case.fixed, **fixed})) for t in self.trials)
 
-
-def write_wrapped(folder: Path, box: BlackBox, accepted: Sequence[Scored], fit: Fit) -> Path:
-    """Write ``wrapper.json`` with the accepted effects at the fitted values."""
-    values = {**box.with_effects(accepted)[0].case.fixed, **fit.unknowns.named(fit.vector)}
-    return write_wrapper(folder, box.trials[0].case.fmu, box.wrapper, values)
-
-
-def wrap_black_box(scenario: Scenario, trials: tuple[Trial, ...], effects: Iterable[Effect]) -> BlackBox:
+def wrap_black_box(scenario: Scenario, cases: Sequence[Case], effects: Iterable[Effect]) -> BlackBox:
     """Wrap the scenario's FMU so that every effect that fits can be put on; all are neutral.
+
+    The drive is measured along the fit recordings ``cases``.
 
     ScenarioError if the load does nothing; StudyError if no recording can be simulated.
     """
     assert scenario.diagnose is not None
     spec, effects = scenario.diagnose.blackbox, tuple(effects)
     assert spec is not None
-    cases = [t.case for t in trials if t.part == "fit"]
     observed = _outputs(spec)
     runs = _simulate(scenario.fmu, cases, observed, scenario.simulation)
     first = next(case for case in cases if case.name in runs)
@@ -81,8 +63,7 @@ def wrap_black_box(scenario: Scenario, trials: tuple[Trial, ...], effects: Itera
             for name, run in _simulate(scenario.fmu, wrapped, observed, scenario.simulation).items()
         }
 
-    own = tuple(replace(t, case=replace(t.case, wrapper=wrapper)) for t in trials)
-    return BlackBox(own, wrapper, slots, candidates, _notes(spec, drive, effects, candidates), signals_at)
+    return BlackBox(wrapper, slots, candidates, _notes(spec, drive, effects, candidates), signals_at)
 
 
 def terms_of(candidates: Iterable[Candidate]) -> tuple[Term, ...]:

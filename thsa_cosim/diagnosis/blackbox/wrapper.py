@@ -15,8 +15,8 @@ import numpy as np
 from thsa_cosim.batch import PlantRun
 from thsa_cosim.diagnosis.blackbox.drive import Drive, integral_of
 from thsa_cosim.diagnosis.blackbox.places import PLACES, Place
-from thsa_cosim.diagnosis.catalogue import catalogue
-from thsa_cosim.diagnosis.effect import Law
+from thsa_cosim.diagnosis.catalogue.effect import Law
+from thsa_cosim.diagnosis.catalogue.known import known_effects
 from thsa_cosim.scenario import BlackBoxSpec
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -239,7 +239,7 @@ def laws(folder: Path | None) -> dict[tuple[str, str], Law]:
     """The laws of all effects by name and block."""
     return {
         (effect.name, variant.block): variant.law
-        for effect in catalogue(folder).values()
+        for effect in known_effects(folder).values()
         for variant in effect.variants
         if variant.law is not None
     }

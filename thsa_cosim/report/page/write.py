@@ -1,6 +1,7 @@
 """A study folder → one HTML file that needs nothing else: style, script, plotly and data are inside."""
 
 import base64
+import contextlib
 import hashlib
 import os
 from collections.abc import Callable, Sequence
@@ -10,27 +11,26 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from thsa_cosim import __version__
-from thsa_cosim.errors import InputError
-from thsa_cosim.report.page.comparison import comparison
-from thsa_cosim.report.page.content import Block, Figure, Fold, Section
-from thsa_cosim.report.page.convergence import convergence
-from thsa_cosim.report.page.correlation import correlation
-from thsa_cosim.report.page.diagnosis import before_after, candidates, recordings
-from thsa_cosim.report.page.failures import failures
-from thsa_cosim.report.page.folder import Part, Study, read_study
-from thsa_cosim.report.page.friction import friction
-from thsa_cosim.report.page.gains import gains
-from thsa_cosim.report.page.parameters import parameters
-from thsa_cosim.report.page.pareto import pareto
-from thsa_cosim.report.page.plane import plane
-from thsa_cosim.report.page.provenance import provenance
-from thsa_cosim.report.page.responses import responses
-from thsa_cosim.report.page.schedule import schedule
-from thsa_cosim.report.page.structure import attribution, structure
+from thsa_cosim.errors import InputError, MissingExtraError
+from thsa_cosim.report.diagnose.structure import attribution, structure
+from thsa_cosim.report.diagnose.verdict import before_after, candidates, recordings
+from thsa_cosim.report.folder import Part, Study, read_study
+from thsa_cosim.report.identify.correlation import correlation
+from thsa_cosim.report.identify.friction import friction
+from thsa_cosim.report.identify.parameters import parameters
 from thsa_cosim.report.page.summary import summary
+from thsa_cosim.report.parts.comparison import comparison
+from thsa_cosim.report.parts.content import Block, Figure, Fold, Section
+from thsa_cosim.report.parts.convergence import convergence
+from thsa_cosim.report.parts.failures import failures
+from thsa_cosim.report.parts.provenance import provenance
+from thsa_cosim.report.tune.gains import gains
+from thsa_cosim.report.tune.pareto import pareto
+from thsa_cosim.report.tune.plane import plane
+from thsa_cosim.report.tune.responses import responses
+from thsa_cosim.report.tune.schedule import schedule
 
 PAGE = "report.html"
 
@@ -109,18 +109,23 @@ def render(study: Study, shown: list[Section]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    scripts = [get_plotlyjs(), _template("page.js")]
+    scripts = [_plotly(), _template("page.js")]
     return environment.get_template("page.html").render(
         study=study,
         sections=shown,
         groups=[list(members) for _, members in groupby(shown, key=lambda section: section.group)],
-        figures={f.name: _figure_data(f) for section in shown for f in _figures(section.blocks)},
+        figures={name: _figure_data(figure) for name, figure in figures_of(shown).items()},
         style=Markup(_template("page.css")),
         scripts=[Markup(text) for text in scripts],
         # Only these scripts may run, and nothing may be fetched: a name that slipped through could do nothing.
         script_digests=[_digest(text) for text in scripts],
         version=__version__,
     )
+
+
+def figures_of(shown: Sequence[Section]) -> dict[str, Figure]:
+    """All figures of the sections by name, in their order."""
+    return {figure.name: figure for section in shown for figure in _figures(section.blocks)}
 
 
 def _figure_data(figure: Figure) -> dict[str, object]:
@@ -136,6 +141,18 @@ def _figures(blocks: Sequence[Block]) -> list[Figure]:
         elif isinstance(block, Fold):
             found += _figures(block.blocks)
     return found
+
+
+def _plotly() -> str:
+    """Plotly's script: a wheel carries it; a checkout takes it from plotly itself."""
+    with contextlib.suppress(FileNotFoundError):
+        return _template("plotly.min.js")
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError as error:
+        raise MissingExtraError("A page of an editable installation", "test") from error
+    script: str = get_plotlyjs()
+    return script
 
 
 def _template(name: str) -> str:

@@ -1,0 +1,196 @@
+"""`check_fmu` against FMUs that are right, wrong in one known way each, or that take their process down."""
+
+import json
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmu_sources.build import FAULTS, LAG2, lag2, library, write_fmu
+
+from thsa_cosim.check import CheckReport, Finding, Verdict, check_fmu
+from thsa_cosim.errors import FmuError
+from thsa_cosim.fmu import probe, read_description
+
+FMUS = Path(__file__).parents[2] / "fmus"
+
+CARELESS = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Careless" guid="{careless}" generationTool="thsa-cosim tests">
+ <CoSimulation modelIdentifier="careless2" canHandleVariableCommunicationStepSize="true"/>
+ <DefaultExperiment startTime="0" stopTime="1" stepSize="0.01"/>
+ <ModelVariables>
+  <ScalarVariable name="tau" valueReference="1" causality="parameter" variability="fixed" initial="exact">
+    <Real start="0.5" min="0.1"/></ScalarVariable>
+  <ScalarVariable name="y" valueReference="2" causality="output" variability="continuous" initial="exact">
+    <Real start="1"/></ScalarVariable>
+ </ModelVariables>
+ <ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>
+</fmiModelDescription>
+"""
+RIGHT = {
+    "description": Verdict.OK,
+    "platform": Verdict.OK,
+    "demands": Verdict.OK,
+    "inputs": Verdict.OK,
+    "runs": Verdict.OK,
+    "new process": Verdict.OK,
+    "fresh instance": Verdict.OK,
+    "reset": Verdict.OK,
+    "reset of start values": Verdict.OK,
+    "communication step": Verdict.OK,
+    "model exchange": Verdict.NOT_TRIED,
+    "memory over instances": Verdict.OK,
+    "file handles over instances": Verdict.OK,
+    "memory over resets": Verdict.OK,
+    "file handles over resets": Verdict.OK,
+}
+Build = Callable[..., Path]
+
+
+@pytest.fixture(scope="module")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    folder = tmp_path_factory.mktemp("check")
+
+    def careless(*flags: str) -> Path:
+        path = folder / f"careless_{'_'.join(flags)}.fmu"
+        if not path.exists():
+            write_fmu(path, CARELESS, library("careless2.c", *flags), "careless2")
+        return path
+
+    return careless
+
+
+def verdicts(report: CheckReport) -> dict[str, Verdict]:
+    return {finding.name: finding.verdict for finding in report.findings}
+
+
+def line(report: CheckReport, name: str) -> Finding:
+    return next(finding for finding in report.findings if finding.name == name)
+
+
+def test_a_right_fmu_passes_every_trial_and_says_what_it_is(build: Build) -> None:
+    seen: list[Finding] = []
+    report = check_fmu(build(), cycles=20, on_finding=seen.append)
+    assert verdicts(report) == RIGHT
+    assert tuple(seen) == report.findings
+    assert report.verdict is Verdict.OK
+    assert report.reuse == "reset"
+    as_json = json.loads(json.dumps(report.to_dict()))
+    assert as_json["facts"]["fmi_version"] == "2.0"
+    assert as_json["facts"]["tool"] == "thsa-cosim tests"
+    assert as_json["facts"]["variables"] == {
+        "input": [],
+        "output": ["y"],
+        "parameter": ["tau"],
+        "tunable parameter": [],
+    }
+    assert as_json["findings"][0]["verdict"] == "ok"
+    assert len(as_json["fmu"]["sha256"]) == 64
+
+
+@pytest.mark.parametrize(
+    ("flag", "wrong", "verdict"),
+    [
+        ("EULER", {"communication step"}, Verdict.WARNING),
+        ("KEEPS_VALUES", {"reset of start values"}, Verdict.FAILED),
+        (
+            "SHARED",
+            {"fresh instance", "communication step", "reset", "reset of start values"},
+            Verdict.FAILED,
+        ),
+        ("PER_PROCESS", None, Verdict.FAILED),
+        ("LEAKS", {"memory over instances"}, Verdict.WARNING),
+        ("HANDLES", {"file handles over instances"}, Verdict.WARNING),
+    ],
+)
+def test_each_broken_promise_shows_in_its_line_alone(
+    build: Build, flag: str, wrong: set[str] | None, verdict: Verdict
+) -> None:
+    report = check_fmu(build(flag), cycles=20)
+    found = {name for name, v in verdicts(report).items() if v is not RIGHT[name]}
+    if wrong is None:  # every comparison is with a run of another process, except the leaks
+        assert "new process" in found
+        assert not any(name.startswith(("memory", "file")) for name in found)
+    else:
+        assert found == wrong
+    assert report.verdict is verdict
+    assert report.reuse == ("reset" if not any(n.startswith("reset") for n in found) else "fresh")
+
+
+def test_change_by_the_communication_step_is_the_one_of_forward_euler(build: Build) -> None:
+    report = check_fmu(build("EULER"), cycles=2)
+    n = np.arange(101)
+    coarse, fine = (1.0 - 0.01 / 0.5) ** n, (1.0 - 0.005 / 0.5) ** (2 * n)
+    expected = np.abs(coarse - fine).max() / np.ptp(coarse)
+    assert line(report, "communication step").values["change"] == pytest.approx(expected, rel=1e-6)
+
+
+def test_leaks_are_measured(build: Build) -> None:
+    leak = line(check_fmu(build("LEAKS"), cycles=30), "memory over instances")
+    assert leak.values["growth_bytes_per_run"] == pytest.approx(2**16, rel=0.2)
+    handles = line(check_fmu(build("HANDLES"), cycles=30), "file handles over instances")
+    assert handles.values["left_open"] == 29
+
+
+@pytest.mark.parametrize("fault", ["segfault", "exit", "error", "nan", "hang"])
+def test_an_fmu_that_dies_or_hangs_costs_lines_not_the_report(fault: str) -> None:
+    report = check_fmu(lag2(), values={"fault": FAULTS[fault]}, deadline_s=2.0, cycles=5)
+    assert line(report, "runs").verdict is Verdict.FAILED
+    assert report.verdict is Verdict.FAILED
+    assert line(report, "reset").verdict is Verdict.NOT_TRIED
+    status = {"segfault": "crash", "hang": "timeout", "nan": "not-finite", "error": "fmi-error"}.get(
+        fault, fault
+    )
+    assert line(report, "runs").text.startswith(status)
+
+
+def test_wrong_reset_is_found_and_both_interfaces_compared() -> None:
+    report = check_fmu(lag2("WRONG_RESET"), cycles=5)
+    assert "ramping" in line(report, "runs").text
+    assert line(report, "reset").verdict is Verdict.FAILED
+    assert line(report, "model exchange").verdict is Verdict.OK
+    assert line(report, "inputs").text.startswith("linear within a step")
+    assert report.reuse == "fresh"
+
+
+def test_missing_binary_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "lag.fmu"
+    with zipfile.ZipFile(lag2()) as right, zipfile.ZipFile(path, "w") as wrong:
+        for name in right.namelist():
+            wrong.writestr(name.replace("linux64", "solaris64"), right.read(name))
+    report = check_fmu(path)
+    assert line(report, "platform").verdict is Verdict.FAILED
+    assert "solaris64" in line(report, "platform").text
+    assert line(report, "runs").verdict is Verdict.FAILED
+
+
+def test_what_is_no_fmu_is_an_input_error(tmp_path: Path) -> None:
+    path = tmp_path / "no.fmu"
+    path.write_text("no archive")
+    with pytest.raises(FmuError, match="no zip archive"):
+        check_fmu(path)
+
+
+def test_trial_inputs_stay_within_their_bounds(tmp_path: Path) -> None:
+    start = '<Real start="0" unit="m/s"/>'
+    xml = LAG2.format(guid="{lag}", interpolates="true")
+    u = xml.index('name="u"')
+    xml = xml[:u] + xml[u:].replace(start, '<Real start="2" min="-1" max="2" unit="m/s"/>', 1)
+    description = read_description(write_fmu(tmp_path / "lag.fmu", xml, library("lag2.c"), "lag2"))
+    signals = probe.raised_inputs(description, probe.trial_time(description))
+    assert signals is not None
+    assert signals.names == ("u",)
+    assert signals["u"][0] == 2.0
+    assert signals["u"][-1] == pytest.approx(1.7)
+    changed = probe.changed_parameters(description)
+    assert changed["tau"] == pytest.approx(0.101)
+    assert "fault" not in changed
+
+
+@pytest.mark.parametrize("name", ["THSA.fmu", "fmi3/THSA.fmu"])
+def test_our_own_fmu_earns_reset(name: str) -> None:
+    report = check_fmu(FMUS / name, cycles=20)
+    assert report.verdict is Verdict.OK, [f for f in report.findings if f.verdict is not Verdict.OK]
+    assert report.reuse == "reset"
+    assert line(report, "communication step").values["change"] < 1e-5

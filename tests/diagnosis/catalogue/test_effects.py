@@ -1,0 +1,319 @@
+"""Effects inside the exported superset against closed forms: slot by slot, and in what the sensors read."""
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reference.rig import Rig, rig_at
+from scipy.optimize import brentq
+
+from thsa_cosim.diagnosis import known_effects
+from thsa_cosim.diagnosis.catalogue.superset import build_superset
+from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL, LIBRARY
+from thsa_cosim.fmu import Plant
+from thsa_cosim.signals import Signals
+
+ROOT = Path(__file__).parents[3]
+OUTPUTS = ("v", "x", "w_m", "i_q", "u_q")
+TEMPERATURE, LOAD, SPEED = -20.0, 30e3, 6e-3
+TIME = np.arange(2001) * 1e-3
+#: Up to speed, back, and to rest, under a load.
+COMMAND = np.interp(TIME, [0.1, 0.3, 0.9, 1.3, 1.7, 1.9], [0.0, SPEED, SPEED, -SPEED, -SPEED, 0.0])
+
+
+@pytest.fixture(scope="module")
+def superset(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
+    pytest.importorskip("rumoca")
+    folder = tmp_path_factory.mktemp("superset")
+    effects = [*known_effects().values(), EMPIRICAL]
+    fmu, *_ = build_superset("Actuator", ROOT / "modelica" / "THSA", effects, folder)
+    with Plant.open(fmu) as plant:
+        yield plant
+
+
+def run(plant: Plant, values: Mapping[str, float], more: tuple[str, ...] = ()) -> Signals:
+    inputs = {
+        "v_cmd": COMMAND,
+        "F_load": np.full(TIME.size, LOAD),
+        "T_amb": np.full(TIME.size, TEMPERATURE),
+    }
+    return plant.run(values, Signals(TIME, inputs), (*OUTPUTS, *more), TIME, tolerance=1e-10)
+
+
+def steady(plant: Plant, values: Mapping[str, float], seconds: float = 5.0) -> dict[str, float]:
+    """What the sensors read at constant speed against a constant load, once all has settled."""
+    time = np.linspace(0.0, seconds, 601)
+    start = {"v_cmd": SPEED, "F_load": LOAD, "T_amb": TEMPERATURE}
+    inputs = Signals(time, {n: np.full(time.size, v) for n, v in start.items()})
+    found = plant.run(values, inputs, OUTPUTS, time, tolerance=1e-9)
+    return {name: float(found[name][-1]) for name in OUTPUTS}
+
+
+def test_neutral_it_is_the_declared_model(superset: Plant):
+    with Plant.open(ROOT / "fmus" / "THSA.fmu") as plant:
+        declared = run(plant, {})
+    neutral = run(superset, {})
+    # The sensor's delay needs a time to be a delay at all: 10 us, a thousandth of the sensor's own lag.
+    slope = np.abs(np.gradient(declared["v"], TIME)).max()
+    for name in OUTPUTS:
+        allowed = 1e-5 * slope if name == "v" else 0.0
+        error = np.abs(neutral[name] - declared[name]).max()
+        assert error <= 1e-7 * np.ptp(declared[name]) + 1.1 * allowed, name
+
+
+def rig() -> Rig:
+    return rig_at(TEMPERATURE)
+
+
+def torque(rig: Rig, force: float = LOAD, motor: float = 0.0, gear: float = 0.0, nut: float = 0.0) -> float:
+    """Motor torque [N.m] at SPEED against ``force``, with added friction at motor, gearbox and nut."""
+    w_m = SPEED / rig.k * rig.i
+    screw = force + rig.F_fn + rig.b_n * SPEED + nut
+    gearbox = rig.k * screw + rig.T_fg + rig.b_g * w_m / rig.i + gear
+    return rig.T_fm + rig.b_m * w_m + motor + gearbox / rig.i
+
+
+W_M = SPEED / rig().k * rig().i
+SCREW_FORCE = LOAD + rig().F_fn + rig().b_n * SPEED
+STEADY: dict[str, tuple[dict[str, float], Callable[[Rig], float]]] = {
+    "declared": ({}, lambda r: torque(r) / r.K_t),
+    "stribeck:screw": (
+        {"screwEffect.stribeck.dF": 900.0, "screwEffect.stribeck.v_S": SPEED, "screwEffect.stribeck.n": 1.0},
+        lambda r: torque(r, nut=900.0 * np.exp(-1.0)) / r.K_t,
+    ),
+    "windage:motor": ({"motorEffect.windage.b_q": 1e-5}, lambda r: torque(r, motor=1e-5 * W_M**2) / r.K_t),
+    "asymmetric-friction:gearbox": (
+        {"gearboxEffect.asymmetricFriction.dF": 2.0, "gearboxEffect.asymmetricFriction.db": 0.3},
+        lambda r: torque(r, gear=2.0 + 0.3 * W_M / r.i) / r.K_t,
+    ),
+    # The contact carries its own friction, which acts on the nut: F_s = F + mu F_s.
+    "load-dependent-friction:screw": (
+        {"screwEffect.loadDependentFriction.mu": 0.04},
+        lambda r: torque(r, nut=SCREW_FORCE * 0.04 / (1.0 - 0.04)) / r.K_t,
+    ),
+    "load-dependent-friction:motor": (
+        {"motorEffect.loadDependentFriction.mu": 0.04},
+        lambda r: torque(r) / (1.0 - 0.04) / r.K_t,
+    ),
+    "torque-constant-saturation": (
+        {"torqueEffect.torqueConstantSaturation.a": 2e-3, "torqueEffect.torqueConstantSaturation.b": 1e-3},
+        lambda r: brentq(lambda i: r.K_t * (1.0 - 2e-3 * i**2 - 1e-3 * i) * i - torque(r), 0.0, 10.0),
+    ),
+    "current-sensor-gain": (
+        {"currentSensorEffect.sensorGain.g": 0.03},
+        lambda r: 1.03 * torque(r) / r.K_t,
+    ),
+    "current-sensor-offset": (
+        {"currentSensorEffect.sensorOffset.o": 0.2},
+        lambda r: 0.2 + torque(r) / r.K_t,
+    ),
+}
+
+
+@pytest.mark.parametrize("effect", STEADY)
+def test_the_steady_current_is_that_of_the_balance(superset: Plant, effect: str):
+    values, expected = STEADY[effect]
+    assert steady(superset, values)["i_q"] == pytest.approx(expected(rig()), rel=2e-6)
+
+
+def test_dead_time_costs_its_voltage(superset: Plant):
+    before = steady(superset, {})
+    after = steady(superset, {"inverterEffect.inverterDeadTime.U_d": 1.5})
+    assert after["u_q"] - before["u_q"] == pytest.approx(1.5, rel=1e-5)
+    assert after["i_q"] == pytest.approx(before["i_q"], rel=1e-6)
+
+
+def test_self_heating_settles_where_loss_and_cooling_balance(superset: Plant):
+    h, tau, alpha_R, alpha_psi = 30.0, 0.05, 3.93e-3, -1.2e-3
+    block = "windingEffect.windingSelfHeating"
+    values = {
+        f"{block}.h": h,
+        f"{block}.tau": tau,
+        f"{block}.alpha_R": alpha_R,
+        f"{block}.alpha_psi": alpha_psi,
+    }
+    found, r = steady(superset, values), rig()
+
+    def current(theta: float) -> float:
+        return torque(r) / (r.K_t * (1.0 + alpha_psi * theta))
+
+    theta = brentq(lambda t: h * tau * r.R_s * (1.0 + alpha_R * t) * current(t) ** 2 - t, 0.0, 300.0)
+    voltage = r.R_s * (1.0 + alpha_R * theta) * current(theta) + r.K_t * (1.0 + alpha_psi * theta) * W_M
+    assert found["i_q"] == pytest.approx(current(theta), rel=1e-5)
+    assert found["u_q"] == pytest.approx(voltage, rel=1e-5)
+    assert theta > 10.0  # it is an effect that shows
+
+
+def test_velocity_sensor_gain_and_delay(superset: Plant):
+    plain = run(superset, {})["v"]
+    gained = run(superset, {"velocitySensorEffect.sensorGain.g": 0.05})["v"]
+    np.testing.assert_allclose(gained, 1.05 * plain, atol=1e-7)
+    delayed = run(superset, {"velocitySensorEffect.sensorDelay.tau": 0.008})["v"]
+    smooth = slice(450, 850)  # at constant acceleration and speed, where Pade's approximation is exact
+    np.testing.assert_allclose(delayed[smooth], np.interp(TIME - 0.008, TIME, plain)[smooth], atol=2e-6)
+
+
+def test_backlash_is_the_width_of_the_hysteresis(superset: Plant):
+    gap = 2e-4
+    time = np.linspace(0.0, 4.0, 4001)
+    command = np.interp(time, [0.1, 0.3, 1.7, 2.1, 3.9], [0.0, SPEED, SPEED, -SPEED, -SPEED])
+    still = np.zeros(time.size)
+    inputs = Signals(time, {"v_cmd": command, "F_load": still, "T_amb": still - 20.0})
+
+    def width(values: Mapping[str, float]) -> float:
+        """How far the nut is ahead of the screw, moving back less moving ahead."""
+        found = superset.run(values, inputs, ("x", "w_m", "motor.phi"), time, tolerance=1e-8)
+        lag = found["x"] - rig().k * found["motor.phi"] / rig().i
+        return float(lag[3500] - lag[1500])
+
+    for taken_up in (0.0, 1.0):
+        wide = width({"contactEffect.backlash.gap": gap, "contactEffect.backlash.s_0": taken_up})
+        assert wide - width({}) == pytest.approx(gap, rel=1e-3)
+
+
+@pytest.mark.parametrize("load", [-2e4, 2e4])
+def test_backlash_that_the_load_has_taken_up_starts_at_rest(superset: Plant, load: float):
+    still = np.zeros(TIME.size)
+    inputs = Signals(TIME, {"v_cmd": still, "F_load": still + load, "T_amb": still - 20.0})
+
+    def moved(taken_up: float) -> float:
+        values = {"contactEffect.backlash.gap": 2e-4, "contactEffect.backlash.s_0": taken_up}
+        return float(np.ptp(superset.run(values, inputs, ("x",), TIME, tolerance=1e-8)["x"]))
+
+    assert moved(1.0) < 2e-6
+    assert moved(0.0) > 8e-5
+
+
+def test_torque_ripple_counts_for_the_no_back_device(superset: Plant):
+    ripple = {
+        "shaftEffect.torqueRipple.a_s": 1.5,
+        "shaftEffect.torqueRipple.c_c": 0.05,
+        "shaftEffect.torqueRipple.n": 2.0,
+    }
+    names = (
+        "noBack.tau_s",
+        "noBack.tau_nb",
+        "noBack.s",
+        "screw.F_s",
+        "gearbox.flange_b.phi",
+        "shaftEffect.tau",
+    )
+    found = run(superset, ripple, names)
+    phi, contact = found["gearbox.flange_b.phi"], rig().k * found["screw.F_s"]
+    wanted = 1.5 * np.sin(2.0 * phi) + 0.05 * contact * np.cos(2.0 * phi)
+    np.testing.assert_allclose(found["shaftEffect.tau"], wanted, atol=1e-6)
+    np.testing.assert_allclose(found["noBack.tau_s"], contact + wanted, atol=1e-6)
+    aiding = np.maximum(0.0, -found["noBack.tau_s"] * found["noBack.s"]) * found["noBack.s"]
+    np.testing.assert_allclose(found["noBack.tau_nb"], rig().k_b * aiding, atol=1e-6)
+    assert np.ptp(wanted) > 1.0
+
+
+def test_lead_error_makes_no_power(superset: Plant):
+    time = np.arange(0.0, 2.0, 1e-3)
+    inputs = Signals(
+        time,
+        {
+            "v_cmd": np.interp(time, [0.1, 0.3], [0.0, SPEED]),
+            "F_load": np.full(time.size, -2e4),
+            "T_amb": np.full(time.size, -20.0),
+        },
+    )
+    error = {"contactEffect.leadError.a_s": 2e-5, "contactEffect.leadError.n": 2.0}
+    names = ("noBack.tau_s", "noBack.w", "screw.F_s", "stabilizer.v", "contactEffect.k_e")
+    found = superset.run(error, inputs, names, time, tolerance=1e-8)
+    steady = time > 0.6
+    power = (found["noBack.tau_s"] * found["noBack.w"])[steady]
+    load = (found["screw.F_s"] * found["stabilizer.v"])[steady]
+    assert np.ptp(found["contactEffect.k_e"][steady]) > 7e-5, "the lead errs by 2 %"
+    assert np.max(np.abs(power - load)) < 1e-3 * np.max(np.abs(load))
+
+
+Law = Callable[[Mapping[str, np.ndarray]], np.ndarray]
+FRICTION: dict[str, tuple[dict[str, float], Law]] = {
+    "screwEffect.stribeck": (
+        {"dF": 800.0, "v_S": 1e-3, "n": 2.0},
+        lambda q: 800.0 * np.exp(-((q["v"] / 1e-3) ** 2)) * q["s"],
+    ),
+    "motorEffect.windage": ({"b_q": 2e-5}, lambda q: 2e-5 * q["v"] ** 2 * q["s"]),
+    "motorEffect.cogging": (
+        {"a_s": 0.02, "a_c": 0.01, "a_s2": 0.005, "a_c2": -0.004, "n": 24.0},
+        lambda q: (
+            0.02 * np.sin(24.0 * q["z"])
+            + 0.01 * np.cos(24.0 * q["z"])
+            + 0.005 * np.sin(48.0 * q["z"])
+            - 0.004 * np.cos(48.0 * q["z"])
+        ),
+    ),
+    "gearboxEffect.rippleFriction": (
+        {"a_s": 0.5, "a_c": -0.2, "n": 3.0},
+        lambda q: (0.5 * np.sin(3.0 * q["z"]) - 0.2 * np.cos(3.0 * q["z"])) * q["s"],
+    ),
+    "screwEffect.positionFriction": (
+        {"c1": 2e4, "c2": 300.0, "z_2": 2e-3, "w_2": 5e-4, "c_s": 100.0, "c_c": 50.0, "kappa": 2e3},
+        lambda q: (
+            (
+                2e4 * q["z"]
+                + 300.0 * np.exp(-0.5 * ((q["z"] - 2e-3) / 5e-4) ** 2)
+                + 100.0 * np.sin(2e3 * q["z"])
+                + 50.0 * np.cos(2e3 * q["z"])
+            )
+            * q["s"]
+        ),
+    ),
+    "gearboxEffect.loadDependentFriction": ({"mu": 0.05}, lambda q: 0.05 * np.abs(q["N"]) * q["s"]),
+    "screwEffect.shearThinning": (
+        {"dF": 500.0, "v_0": 2e-3},
+        lambda q: 500.0 * (1.0 - np.exp(-((q["v"] / 2e-3) ** 2))) * q["s"],
+    ),
+}
+
+
+@pytest.mark.parametrize("block", FRICTION)
+def test_friction_follows_its_law_of_speed_position_and_load(superset: Plant, block: str):
+    parameters, law = FRICTION[block]
+    slot = block.split(".")[0]
+    names = {q: f"{slot}.{q}" for q in ("v", "s", "z", "N", "F")}
+    found = run(superset, {f"{block}.{p}": v for p, v in parameters.items()}, tuple(names.values()))
+    quantities = {q: found[name] for q, name in names.items()}
+    expected = law(quantities)
+    assert np.ptp(expected) > 0.0
+    np.testing.assert_allclose(quantities["F"], expected, atol=1e-6 * np.ptp(expected))
+
+
+TERMS: dict[str, Law] = {
+    "1": lambda q: np.ones_like(q["v"]),
+    "v |v|": lambda q: q["v"] * np.abs(q["v"]),
+    "v^3": lambda q: q["v"] ** 3,
+    "z": lambda q: q["z"],
+    "z^2": lambda q: q["z"] ** 2,
+    "z sgn(v)": lambda q: q["z"] * q["s"],
+    "z^2 sgn(v)": lambda q: q["z"] ** 2 * q["s"],
+    "z v": lambda q: q["z"] * q["v"],
+    "N": lambda q: q["N"],
+    "|N| sgn(v)": lambda q: np.abs(q["N"]) * q["s"],
+    "|N| v": lambda q: np.abs(q["N"]) * q["v"],
+    "N^2 sgn(v)": lambda q: q["N"] ** 2 * q["s"],
+}
+
+
+@pytest.mark.parametrize("coefficient", LIBRARY)
+def test_a_term_of_the_empirical_law_is_what_its_name_says(superset: Plant, coefficient: str):
+    term = TERMS[LIBRARY[coefficient][0]]
+    names = {q: f"screwEffect.{q}" for q in ("v", "s", "z", "N")}
+    plain = run(superset, {}, tuple(names.values()))
+    size = 200.0 / np.abs(term({q: plain[n] for q, n in names.items()})).max()  # N
+    found = run(superset, {f"screwEffect.empirical.{coefficient}": size}, (*names.values(), "screwEffect.F"))
+    expected = size * term({q: found[n] for q, n in names.items()})
+    # v |v| stands for v v sgn(v), whose sign is a straight line within the friction's own width
+    np.testing.assert_allclose(found["screwEffect.F"], expected, atol=1e-3)
+
+
+def test_run_in_falls_with_the_distance_whatever_the_direction(superset: Plant):
+    block = "screwEffect.frictionRunIn"
+    found = run(superset, {f"{block}.dF": 600.0, f"{block}.d_r": 3e-3}, ("screwEffect.v", "screwEffect.F"))
+    speed = found["screwEffect.v"]
+    distance = np.concatenate([[0.0], np.cumsum(0.5 * (np.abs(speed[1:]) + np.abs(speed[:-1])) * 1e-3)])
+    moving = np.abs(speed) > 1e-4
+    expected = 600.0 * np.exp(-distance / 3e-3) * np.sign(speed)
+    np.testing.assert_allclose(found["screwEffect.F"][moving], expected[moving], atol=1.0)

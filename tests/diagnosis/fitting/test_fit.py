@@ -1,0 +1,230 @@
+"""Unknowns, Gauss-Newton and scoring on problems in closed form, through a runner that simulates nothing."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from thsa_cosim.batch import Job, Outcome, Status
+from thsa_cosim.costs.channels import Channel
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
+from thsa_cosim.diagnosis.fitting.trials import Trial
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
+from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
+from thsa_cosim.identify.problem import Case
+from thsa_cosim.signals import Signals
+
+TIME = np.linspace(0.0, 4.0, 401)
+NOISE = 0.01
+Model = Callable[[Mapping[str, float]], np.ndarray]
+
+
+def decay(values: Mapping[str, float]) -> np.ndarray:
+    """An exponential decay with an amplitude, a rate and an offset."""
+    return values["a"] * np.exp(-values["r"] * TIME) + values.get("o", 0.0)
+
+
+TRUE = {"a": 2.0, "r": 0.7, "o": 0.3}
+RNG = np.random.default_rng(11)
+MEASURED = {part: decay(TRUE) + NOISE * RNG.standard_normal(TIME.size) for part in ("fit", "validate")}
+
+
+@dataclass
+class Formula:
+    """Runs jobs by a formula; some fail."""
+
+    model: Model
+    fails: Callable[[Mapping[str, float]], bool] = lambda values: False
+    jobs: list[Job] = field(default_factory=list)
+    notes: tuple[str, ...] = ()
+
+    def run(self, jobs: Sequence[Job], on_outcome: object = None) -> list[Outcome]:
+        self.jobs += jobs
+        outcomes = []
+        for job in jobs:
+            part = job.experiment.split("/")[0]
+            if self.fails(job.values):
+                outcomes.append(Outcome(Status.CRASH, "out of range", None, None, 0.0, ""))
+            else:
+                residual = (self.model(job.values) - MEASURED[part]) / NOISE
+                outcomes.append(Outcome(Status.OK, "", None, residual, 0.0, ""))
+        return outcomes
+
+    def close(self) -> None:
+        pass
+
+
+def trial(part: str, group: str = "20 degC") -> Trial:
+    channel = Channel("y", TIME, MEASURED[part], NOISE)
+    empty = Signals(TIME, {})
+    case = Case("a", Path("x.fmu"), empty, TIME, {}, (channel,), empty, 20.0, None)
+    return Trial(case, part, group)  # type: ignore[arg-type]
+
+
+def bench(model: Model = decay, **more: object) -> Bench:
+    runner = Formula(model, **more)  # type: ignore[arg-type]
+    return Bench(runner, [trial("fit"), trial("validate")])  # type: ignore[arg-type]
+
+
+def unknown(name: str, start: float, spread: float = np.inf, **more: object) -> Unknown:
+    given = {"scale": abs(start) or 1.0, "lower": -10.0, "upper": 10.0} | more
+    return Unknown(name, name, "1", start, spread, **given)  # type: ignore[arg-type]
+
+
+FREE = Unknowns((unknown("a", 1.0), unknown("r", 0.4), unknown("o", 0.0)))
+
+
+def expected() -> tuple[np.ndarray, np.ndarray]:
+    """Least squares by Newton's method on the analytic Jacobian: vector and standard errors."""
+    x = np.array([TRUE[n] for n in FREE.names])
+    for _ in range(20):
+        e = np.exp(-x[1] * TIME)
+        jacobian = np.stack([e, -x[0] * TIME * e, np.ones_like(e)], axis=1) / NOISE
+        residual = (decay(dict(zip(FREE.names, x, strict=True))) - MEASURED["fit"]) / NOISE
+        x = x - np.linalg.lstsq(jacobian, residual, rcond=None)[0]
+    return x, np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+
+
+def test_it_finds_the_least_squares_and_its_standard_errors():
+    fit = refine(bench(), FREE, FREE.start)
+    assert fit is not None
+    assert fit.converged
+    vector, stderr = expected()
+    np.testing.assert_allclose(fit.vector, vector, atol=0.05 * stderr.min())
+    fresh, _ = columns(bench(), FREE, fit.vector, fit.residual, [0, 1, 2], np.full(3, 1e-4))
+    information = fresh.T @ fresh
+    found = np.sqrt(np.diag(np.linalg.inv(information))) * FREE.scale
+    np.testing.assert_allclose(found, stderr, rtol=0.05)
+    np.testing.assert_allclose(fit.stderr(), stderr, rtol=0.3)  # its steps are wide, for solvers with events
+    np.testing.assert_allclose(fit.stderr(4.0), 2.0 * fit.stderr(1.0))
+
+
+def test_what_the_drawing_says_counts_as_one_more_measurement():
+    tight = Unknowns((unknown("a", 1.9, spread=1e-5), unknown("r", 0.4), unknown("o", 0.0)))
+    fit = refine(bench(), tight, tight.start)
+    assert fit is not None
+    assert fit.vector[0] == pytest.approx(1.9, abs=1e-4)
+    assert fit.cost == pytest.approx(fit.misfit + float(np.sum(tight.prior(fit.vector) ** 2)))
+    # Between a drawing and a measurement of equal weight the middle is found.
+    vector, stderr = expected()
+    even = Unknowns((unknown("a", vector[0] + 0.01, spread=stderr[0]), *FREE.members[1:]))
+    middle = refine(bench(), even, even.start)
+    assert middle is not None
+    assert middle.vector[0] == pytest.approx(vector[0] + 0.005, abs=0.0015)
+
+
+def test_bounds_hold():
+    bounded = Unknowns((unknown("a", 1.0, upper=1.5), *FREE.members[1:]))
+    fit = refine(bench(), bounded, bounded.start, iterations=20)
+    assert fit is not None
+    assert fit.vector[0] == pytest.approx(1.5)
+
+
+def test_runs_that_fail_are_stepped_around_and_counted():
+    broken = bench(fails=lambda values: values["r"] > 0.75)
+    fit = refine(broken, FREE, FREE.start, iterations=15)
+    assert fit is not None
+    assert fit.vector[1] == pytest.approx(expected()[0][1], rel=1e-3)
+    assert refine(bench(fails=lambda values: True), FREE, FREE.start) is None
+    never = bench(fails=lambda values: True)
+    assert never.residuals(FREE, FREE.start[None, :], "fit") == [None]
+    assert never.failures == {"out of range": 1}
+
+
+def test_columns_that_are_kept_are_not_simulated_again():
+    first = refine(bench(), FREE, FREE.start)
+    assert first is not None
+    again = bench()
+    fit = refine(
+        again,
+        FREE,
+        first.vector,
+        residual=first.residual,
+        jacobian=first.jacobian,
+        steps=first.steps,
+        fresh=[2],
+    )
+    assert fit is not None
+    assert again.evaluations < 20
+    np.testing.assert_allclose(fit.vector, first.vector, atol=1e-3)
+
+
+def test_unknowns_of_a_temperature_reach_only_its_recordings():
+    members = (
+        unknown("R at 20", 1.2, group="20 degC", offset=-0.2),
+        unknown("R at -30", 0.5, group="-30 degC"),
+        unknown("L", 2e-3),
+    )
+    unknowns = Unknowns(members)
+    assert unknowns.assignments(unknowns.start, "20 degC") == {"R at 20": pytest.approx(1.0), "L": 2e-3}
+    assert unknowns.assignments(unknowns.start, "-30 degC") == {"R at -30": 0.5, "L": 2e-3}
+    assert unknowns.index(["L", "R at 20"]) == [2, 0]
+    assert unknowns.named(unknowns.start)["L"] == 2e-3
+    np.testing.assert_array_equal(unknowns.clip(np.array([99.0, -99.0, 1.0])), [10.0, -10.0, 1.0])
+    assert unknowns.precision.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_channel_is_weighed_by_what_the_model_leaves_in_it():
+    lacking = Unknowns(FREE.members[:2])  # no offset
+    own = bench()
+    fit = refine(own, lacking, lacking.start)
+    assert fit is not None
+    rms = float(np.sqrt(np.mean(fit.residual**2)))
+    assert rms > 2.0
+    levels = ChannelWeights(own)
+    weighed, held = levels.weigh(fit)
+    assert own.weights["y"] == pytest.approx(1.0 / rms)
+    assert np.sqrt(np.mean(weighed.residual**2)) == pytest.approx(1.0, rel=1e-3)
+    assert held is not None
+    plain = own.residuals(lacking, weighed.vector[None, :], "validate")[0] * rms
+    np.testing.assert_allclose(levels.plain(held, "validate"), plain)
+    assert levels.left(held) == pytest.approx(rms**2, rel=0.3)
+
+
+def test_weights_return_to_one_with_the_right_model_and_rescale_what_they_are_compared_with():
+    own = bench()
+    wrong = refine(own, Unknowns(FREE.members[:2]), FREE.start[:2])
+    assert wrong is not None
+    levels = ChannelWeights(own)
+    _, held = levels.weigh(wrong)
+    assert held is not None
+    levels.base_held = held
+    plain = levels.plain(held, "validate")
+    right = refine(own, FREE, FREE.start)
+    assert right is not None
+    fit, _ = levels.weigh(right)
+    assert own.weights["y"] == pytest.approx(1.0, abs=0.1)
+    np.testing.assert_allclose(levels.plain(levels.base_held, "validate"), plain)
+    again, _ = levels.weigh(fit)
+    assert again is fit, "nothing changed, so nothing is fitted"
+
+
+def test_what_is_held_at_its_bound_does_not_keep_the_others_from_their_optimum():
+    """An amplitude that may not fall as far as it wants: rate and offset make up for it, as a bounded solver says."""
+    bounded = Unknowns((unknown("a", 2.5, lower=2.3), unknown("r", 0.4), unknown("o", 0.0)))
+    fit = refine(bench(), bounded, bounded.start, iterations=20)
+    assert fit is not None
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        return (decay({"a": x[0], "r": x[1], "o": x[2]}) - MEASURED["fit"]) / NOISE
+
+    best = least_squares(residual, bounded.start, bounds=([2.3, -10.0, -10.0], 10.0))
+    assert fit.vector[0] == 2.3
+    assert fit.misfit == pytest.approx(2.0 * best.cost, rel=1e-3)
+
+
+def test_the_drawing_is_not_widened_by_what_the_recordings_leave_unexplained():
+    """Two unknowns that only act together, one known from the drawing: the other is as sure as that."""
+    jacobian = np.ones((100, 2)) * 1e3
+    members = (unknown("J", 1.0, spread=0.01, scale=1.0), unknown("a", 0.0, scale=1.0))
+    fit = Fit(Unknowns(members), np.ones(2), np.full(100, 30.0), jacobian, np.ones(2), 0.0, True)
+    assert fit.inflation == 900.0
+    np.testing.assert_allclose(fit.stderr(fit.inflation), 0.01, rtol=0.1)
+    free = Unknowns((unknown("J", 1.0), unknown("a", 0.0), unknown("b", 0.0)))
+    none = Fit(free, np.ones(3), np.ones(100), np.ones((100, 3)) * [1e3, 1e3, 0.0], np.ones(3), 0.0, True)
+    assert np.isinf(none.stderr()).all(), "two act only together, the third not at all"
+    assert none.inflation == 1.0

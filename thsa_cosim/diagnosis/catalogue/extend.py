@@ -1,0 +1,84 @@
+"""Declared model + effects → a new Modelica class → a new FMU.
+
+The class extends the declared one and redeclares its slots; each slot gets a block that adds up the effects there, so
+that one and several effects have the same form, and the superset that the search runs is made the same way (decision
+004).
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from thsa_cosim.diagnosis.catalogue.candidate import Candidate
+from thsa_cosim.diagnosis.catalogue.slots import INPUTS, OUTPUTS, Slot
+from thsa_cosim.export import export_fmu
+
+
+def extended_class(
+    name: str,
+    base: str,
+    candidates: Sequence[Candidate],
+    values: Mapping[str, float] | None = None,
+    description: str = "",
+) -> str:
+    """Modelica source of a class ``name`` that extends ``base`` (qualified) with the candidates' effects.
+
+    ``values``: start values by FMU variable, in SI units as the classes have them; else neutral.
+    """
+    slots = {candidate.slot.name: candidate.slot for candidate in candidates}
+    members = {
+        name: tuple({c.component: c for c in candidates if c.slot.name == name}.values()) for name in slots
+    }
+    blocks = [_block(slot, members[name], values or {}) for name, slot in slots.items()]
+    redeclared = ",\n    ".join(f"redeclare {_block_name(slot)} {slot.component}" for slot in slots.values())
+    return (
+        f'within ;\nmodel {name} "{description or base}"\n'
+        + "".join(blocks)
+        + f"  extends {base}(\n    {redeclared});\nend {name};\n"
+    )
+
+
+def _block_name(slot: Slot) -> str:
+    return slot.name[0].upper() + slot.name[1:] + "Effects"
+
+
+def _block(slot: Slot, members: Sequence[Candidate], values: Mapping[str, float]) -> str:
+    lines = [f'  block {_block_name(slot)} "{", ".join(m.effect.title for m in members)}"']
+    lines.append(f"    extends THSA.Interfaces.{slot.interface};")
+    for member in members:
+        set_values = {p.name: values.get(p.variable, p.at_start) for p in member.all_parameters}
+        modifiers = ", ".join(
+            f'{p.name}(unit="{p.unit}") = {set_values[p.name]!r}' for p in member.all_parameters
+        )
+        lines.append(f"    {member.qualified_block} {member.component}({modifiers});")
+    lines.append("  equation")
+    for member in members:
+        lines += [f"    {member.component}.{v} = {v};" for v in INPUTS[slot.interface]]
+    for output in OUTPUTS[slot.interface]:
+        lines.append(f"    {output} = {' + '.join(f'{m.component}.{output}' for m in members)};")
+    return "\n".join([*lines, f"  end {_block_name(slot)};\n"])
+
+
+def write_extended(folder: Path, name: str, source: str) -> Path:
+    """Write ``<folder>/<name>.mo``; its folder holds nothing else that a Modelica compiler would load beside it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{name}.mo"
+    path.write_text(source, encoding="utf-8")
+    return path
+
+
+def write_extended_model(
+    folder: Path, model: str, package: Path, candidates: Sequence[Candidate], values: Mapping[str, float]
+) -> tuple[Path, Path]:
+    """Write the class that holds the candidates with their ``values``, and export it; (.mo, .fmu) in ``folder``."""
+    base = qualified(model, package)
+    effects = list(dict.fromkeys(c.effect.name for c in candidates))
+    name = "_and_".join([f"{base.split('.')[0]}_with_{effects[0]}", *effects[1:]]).replace("-", "_")
+    titles = ", ".join(dict.fromkeys(c.effect.title for c in candidates))
+    source = extended_class(name, base, candidates, values, f"{base} with: {titles}")
+    file = write_extended(folder, name, source)
+    return file, export_fmu(str(file), package=package, output=folder / f"{name}.fmu")
+
+
+def qualified(model: str, package: Path) -> str:
+    """``Actuator`` → ``THSA.Actuator``."""
+    return model if model.split(".")[0] == package.name else f"{package.name}.{model}"

@@ -1,0 +1,142 @@
+"""The superset: the declared model with every effect of the catalogue, each neutral, as one FMU.
+
+One FMU serves the whole search: a candidate is a few start values. At neutral it is the declared model.
+"""
+
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from thsa_cosim.batch import Experiment, Job, Status
+from thsa_cosim.diagnosis.catalogue.candidate import Candidate, candidates_of
+from thsa_cosim.diagnosis.catalogue.effect import Effect
+from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, write_extended
+from thsa_cosim.diagnosis.catalogue.slots import SCALES, Slot, find_slots
+from thsa_cosim.errors import StudyError
+from thsa_cosim.export import export_fmu
+from thsa_cosim.fmu import read_description
+from thsa_cosim.identify.problem import Case
+from thsa_cosim.scenario import Scenario, SimulationSpec, open_runner
+from thsa_cosim.signals import Signals
+from thsa_cosim.study import export_digest, is_made_from, note_made_from
+
+#: What an FMU for this machine alone is compiled for.
+_HERE = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}
+
+
+@dataclass(frozen=True, eq=False)
+class Superset:
+    """The FMU with all effects, its slots, and the candidates with the scales of this drive.
+
+    ``signals_at``: start values by case → the inputs of every friction slot by case.
+    """
+
+    fmu: Path
+    slots: tuple[Slot, ...]
+    candidates: tuple[Candidate, ...]
+    signals_at: Callable[[Mapping[str, Mapping[str, float]]], Mapping[str, Signals]]
+
+
+def this_platform() -> tuple[str, ...] | None:
+    """What to compile for to run here; None (all) on a machine that is not known."""
+    name = _HERE.get(sys.platform)
+    return (name,) if name else None
+
+
+def open_superset(
+    scenario: Scenario, model: str, cases: Sequence[Case], effects: Iterable[Effect], folder: Path
+) -> Superset:
+    """Export the superset of ``model`` and measure its scales on the fit recordings ``cases``.
+
+    StudyError if no recording can be simulated.
+    """
+    assert scenario.diagnose is not None
+    fmu, slots, chosen = build_superset(model, scenario.diagnose.package, effects, folder)
+    own = [replace(case, fmu=fmu) for case in cases]
+    candidates = candidates_of(chosen, slots, scales_of(fmu, slots, own, scenario.simulation))
+    return Superset(
+        fmu, slots, candidates, lambda values: slot_signals(slots, own, values, scenario.simulation)
+    )
+
+
+def build_superset(
+    model: str, package: Path, effects: Iterable[Effect], folder: Path
+) -> tuple[Path, tuple[Slot, ...], tuple[Effect, ...]]:
+    """Export the superset into ``folder``, where it is kept until anything that it is made from changes."""
+    slots, effects = find_slots(model, package), tuple(effects)
+    candidates = candidates_of(effects, slots, {})
+    name = qualified(model, package).replace(".", "_") + "_superset"
+    source = extended_class(name, qualified(model, package), candidates, description="All effects, neutral")
+    fmu = folder / f"{name}.fmu"
+    platforms = this_platform()
+    made_from = export_digest(source, package, platforms)
+    if not is_made_from(fmu, made_from):
+        file = write_extended(folder, name, source)
+        export_fmu(str(file), package=package, output=fmu, platforms=platforms)
+        note_made_from(fmu, made_from)
+    return fmu, slots, effects
+
+
+def scales_of(
+    fmu: Path, slots: Sequence[Slot], cases: Sequence[Case], simulation: SimulationSpec
+) -> dict[str, dict[str, float]]:
+    """How large speed, position, load … are in each slot over the recordings, in the slot's units.
+
+    V, Z: largest magnitude; F, I, P: root mean square; D: distance travelled; W: 1 for an angle, else 2π/Z.
+    Raises StudyError if no recording can be simulated.
+    """
+    wanted = {
+        (slot.name, s): f"{slot.component}.{v}" for slot in slots for s, v in SCALES[slot.interface].items()
+    }
+    known = read_description(fmu).variables
+    outputs = tuple(dict.fromkeys(v for v in wanted.values() if v in known))
+    experiments = [_with_outputs(case, outputs) for case in cases]
+    with open_runner(simulation, experiments, 1, None) as runner:
+        outcomes = runner.run([Job(e.name) for e in experiments])
+    runs = [o.signals for o in outcomes if o.status == Status.OK and o.signals is not None]
+    if not runs:
+        raise StudyError(
+            f"{fmu.name}: no recording can be simulated with the declared parameters: {outcomes[0].reason}"
+        )
+    scales: dict[str, dict[str, float]] = {}
+    for slot in slots:
+        own: dict[str, float] = {}
+        for symbol, variable in SCALES[slot.interface].items():
+            name = f"{slot.component}.{variable}"
+            if name in outputs:
+                own[symbol] = _scale(symbol, [run[name] for run in runs])
+                if symbol == "Z":
+                    own["D"] = max(float(np.sum(np.abs(np.diff(run[name])))) for run in runs) or 1.0
+        angular = slot.units.get("z", "rad") == "rad"
+        own["W"] = 1.0 if angular else 2.0 * np.pi / own.get("Z", 1.0)
+        scales[slot.name] = own
+    return scales
+
+
+def _scale(symbol: str, values: Sequence[np.ndarray]) -> float:
+    joined = np.concatenate(values)
+    size = np.max(np.abs(joined)) if symbol in "VZ" else np.sqrt(np.mean(joined**2))
+    return float(size) or 1.0
+
+
+def _with_outputs(case: Case, outputs: tuple[str, ...]) -> Experiment:
+    return replace(case.experiment(case.name, None), outputs=outputs)
+
+
+def slot_signals(
+    slots: Sequence[Slot],
+    cases: Sequence[Case],
+    values: Mapping[str, Mapping[str, float]],
+    simulation: SimulationSpec,
+) -> dict[str, Signals]:
+    """Inputs of every friction slot over each recording, by case name, at the given start values per case."""
+    outputs = tuple(
+        f"{s.component}.{v}" for s in slots if s.interface == "FrictionEffect" for v in ("v", "z", "N")
+    )
+    experiments = [_with_outputs(case, outputs) for case in cases]
+    with open_runner(simulation, experiments, 1, None) as runner:
+        outcomes = runner.run([Job(c.name, values[c.name]) for c in cases])
+    return {c.name: o.signals for c, o in zip(cases, outcomes, strict=True) if o.signals is not None}

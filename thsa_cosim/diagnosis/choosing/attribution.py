@@ -1,0 +1,172 @@
+"""Which effects the recordings ask for: screen, refine, score on held-out recordings, accept one, and again.
+
+Forward selection (each step against the model so far, declared parameters fitted along), then every accepted
+effect must still be needed beside the others.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from thsa_cosim.diagnosis.catalogue.candidate import Candidate
+from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
+from thsa_cosim.diagnosis.choosing.gates import SIGMAS, SMALLEST_STRUCTURE, out_of_range
+from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns
+from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
+from thsa_cosim.diagnosis.choosing.selection import Say, Selection
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
+from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency
+from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
+from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
+from thsa_cosim.signals import FloatArray
+
+Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """One screening: its threshold, what was proposed, what was refined (best first) and what was decided.
+
+    ``objections``: why each of the first refined ones was not accepted, "" for the one that was. ``rivals``: other
+    effects that explain the held-out recordings as well as the accepted one, within the uncertainty. ``factors`` (N,):
+    how the residuals of the fit recordings were weighed.
+    """
+
+    threshold: float
+    proposals: tuple[Proposal, ...]
+    scored: tuple[Scored, ...]
+    accepted: Scored | None
+    objections: tuple[str, ...]
+    rivals: tuple[Scored, ...]
+    gains: FloatArray
+    factors: FloatArray
+
+    def probability(self, gain: float) -> float:
+        """Probability that chance makes at least ``gain``."""
+        return probability(gain, self.gains)
+
+
+@dataclass(frozen=True, eq=False)
+class Attribution:
+    """The declared model's fit, the rounds, the accepted effects in order, and the model with them.
+
+    ``base_cost``: of the declared model's fit without weights, the prior's share included.
+    ``base_validate``, ``final_validate`` (N,): held-out residuals of both, in standard deviations of the noise.
+    """
+
+    base: Fit
+    base_cost: float
+    rounds: tuple[Round, ...]
+    accepted: tuple[Scored, ...]
+    final: Fit
+    base_validate: FloatArray
+    final_validate: FloatArray
+    notes: tuple[str, ...] = field(default=())
+
+
+def attribute(
+    bench: Bench,
+    unknowns: Unknowns,
+    candidates: Sequence[Candidate],
+    scan: Scan,
+    *,
+    start: FloatArray | None = None,
+    seed: int,
+    most: int = 3,
+    say: Say = lambda _: None,
+) -> Attribution | None:
+    """Find the effects, the declared parameters from ``start`` (default: the drawing); None if that does not run."""
+    say("fitting the declared model")
+    base = refine(bench, unknowns, unknowns.start if start is None else start, iterations=10)
+    if base is None:
+        return None
+    weights = ChannelWeights(bench)
+    base, held = weights.weigh(base)
+    if held is None:
+        return None
+    base_cost = cost_of(unknowns, base.vector, weights.plain(base.residual, "fit"))
+    weights.base_held = held
+    current, current_held = base, held
+    rounds: list[Round] = []
+    accepted: list[Scored] = []
+    for number in range(most):
+        if accepted and weights.left(current_held) < SMALLEST_STRUCTURE**2:
+            break
+        say(
+            f"screening {len(candidates)} candidates"
+            + (f" beside {accepted[-1].candidate.name}" if accepted else "")
+        )
+        taken = {s.candidate.key for s in accepted}
+        proposals = screen(bench, current, [c for c in candidates if c.key not in taken], scan(current))
+        gains = largest_gains(current, proposals, seed + number)
+        limit = threshold(gains)
+        selection = Selection(bench, weights, current, current_held, say)
+        scored = selection.refined(proposals, limit)
+        choice, objections = selection.choose(scored, limit, not accepted)
+        factors = bench.factors("fit")
+        named = {s.candidate.effect.name for s in accepted}
+        rivals: tuple[Scored, ...] = ()
+        if choice is not None:
+            scored += selection.elsewhere(choice, scored, proposals)
+            rivals = selection.rivals(choice, scored, named)
+        rounds.append(
+            Round(limit, tuple(proposals), tuple(scored), choice, objections, rivals, gains, factors)
+        )
+        if choice is None:
+            break
+        accepted.append(choice)
+        current, reweighed = weights.weigh(choice.fit)
+        if reweighed is None:
+            return None
+        current_held = reweighed
+    accepted, current, current_held, notes = prune(bench, unknowns, weights, accepted, current, current_held)
+    while accepted and (name := out_of_range(current)):
+        notes.append(f"{accepted[-1].candidate.name} was dropped: it drives {name} to the end of its range")
+        accepted = accepted[:-1]
+        current = accepted[-1].fit if accepted else base
+        fallen = bench.residuals(current.unknowns, current.vector[None, :], "validate")[0]
+        if fallen is None:
+            return None
+        current_held = fallen
+    return Attribution(
+        base,
+        base_cost,
+        tuple(rounds),
+        tuple(accepted),
+        current,
+        weights.plain(weights.base_held, "validate"),
+        weights.plain(current_held, "validate"),
+        tuple(notes),
+    )
+
+
+def prune(
+    bench: Bench,
+    unknowns: Unknowns,
+    weights: ChannelWeights,
+    accepted: list[Scored],
+    current: Fit,
+    held: FloatArray,
+) -> tuple[list[Scored], Fit, FloatArray, list[str]]:
+    """Drop every earlier effect that the later ones have made needless."""
+    notes: list[str] = []
+    while len(accepted) > 1:
+        for dropped in accepted[:-1]:
+            kept = [s for s in accepted if s is not dropped]
+            fewer = extended_unknowns(unknowns, kept)
+            vector = current.at(fewer.names)
+            fit = refine(bench, fewer, vector, iterations=6, enough=3.0)
+            validate = None if fit is None else bench.residuals(fewer, fit.vector[None, :], "validate")[0]
+            if fit is None or validate is None:
+                continue
+            lost = block_gains(bench.of("validate"), validate, held)
+            total = float(weights.base_held @ weights.base_held - held @ held)
+            if consistency(lost) < SIGMAS or float(lost.sum()) < 0.01 * total:
+                notes.append(
+                    f"{dropped.candidate.name} was dropped: the effects found after it explain the same"
+                )
+                accepted, current, held = kept, fit, validate
+                break
+        else:
+            break
+    return accepted, current, held, notes

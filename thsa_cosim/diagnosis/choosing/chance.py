@@ -1,0 +1,52 @@
+"""How large a gain chance makes, by a parametric bootstrap of the fitted model.
+
+White noise of the sensors' size is drawn over and over; each time the declared parameters are fitted (to first order)
+and every proposal is offered, as in the search. The largest gain of each draw is what a model
+that lacks nothing would show (Efron and Tibshirani, An Introduction to the Bootstrap, chapter 6).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from thsa_cosim.diagnosis.choosing.screen import Orthogonal, Proposal
+from thsa_cosim.diagnosis.fitting.fit import Fit
+from thsa_cosim.signals import FloatArray
+
+DRAWS = 1000
+_EULER = 0.5772156649
+
+
+def largest_gains(base: Fit, proposals: Sequence[Proposal], seed: int, draws: int = DRAWS) -> FloatArray:
+    """(draws,) the largest gain that any of the proposals has on noise alone; what does nothing gains nothing."""
+    proposals = [p for p in proposals if p.is_testable]
+    if not proposals:
+        return np.zeros(draws)
+    orthogonal = Orthogonal(base)
+    left = np.concatenate([orthogonal.remaining(p.response) for p in proposals], axis=1)
+    size = np.sqrt(np.maximum(np.sum(left**2, axis=0, dtype=float), 1e-300))
+    left /= size.astype(left.dtype)
+    # White noise pulls at the responses with their Gram matrix as covariance, so the noise itself need not be drawn.
+    correlation = np.asarray(left.T @ left, dtype=float)
+    values, vectors = np.linalg.eigh(correlation)
+    normal = np.random.default_rng(seed).standard_normal((values.size, draws))
+    pull = vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * normal)
+    best, position = np.zeros(draws), 0
+    for proposal in proposals:
+        own = slice(position, position := position + proposal.response.shape[1])
+        whitened = np.linalg.lstsq(correlation[own, own], pull[own], rcond=1e-6)[0]
+        best = np.maximum(best, np.sum(pull[own] * whitened, axis=0))
+    return best
+
+
+def threshold(gains: FloatArray, chance: float = 1e-3) -> float:
+    """Gain that chance exceeds with probability ``chance``: Gumbel's law through the draws' mean and deviation."""
+    spread = float(np.std(gains, ddof=1)) * np.sqrt(6.0) / np.pi
+    return float(np.mean(gains) - _EULER * spread - spread * np.log(-np.log1p(-chance)))
+
+
+def probability(gain: float, gains: FloatArray) -> float:
+    """Probability that chance makes at least ``gain``."""
+    spread = max(float(np.std(gains, ddof=1)) * np.sqrt(6.0) / np.pi, 1e-9)
+    location = float(np.mean(gains)) - _EULER * spread
+    return float(-np.expm1(-np.exp(-min((gain - location) / spread, 700.0))))

@@ -1,0 +1,148 @@
+"""One candidate fitted together with the declared parameters, and its score on the held-out recordings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from thsa_cosim.diagnosis.catalogue.candidate import Candidate
+from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
+from thsa_cosim.diagnosis.fitting.structure import block_squares, consistency, relative_consistency, structure
+from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
+from thsa_cosim.signals import FloatArray
+
+#: Mean squared residual, in variances of the noise, above which a fit may have missed the optimum.
+ENOUGH = 1.05
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """A candidate fitted together with the declared parameters, and its score on the held-out recordings.
+
+    ``fit_gain``, ``held_out_gain``: decrease of the squared residuals in variances of the noise. ``consistency``: the
+    held-out gain over blocks of time in standard errors. ``share``: of the held-out structure explained.
+    """
+
+    proposal: Proposal
+    fit: Fit
+    validate: FloatArray
+    fit_gain: float
+    held_out_gain: float
+    consistency: float
+    share: float
+
+    @property
+    def candidate(self) -> Candidate:
+        """The candidate."""
+        return self.proposal.candidate
+
+
+def score(
+    bench: Bench, current: Fit, held: FloatArray, proposal: Proposal, iterations: int = 2
+) -> Scored | None:
+    """Fit a proposal's parameters beside the current ones, whose Jacobian is kept, and score it; None if it fails."""
+    own = unknowns_of(proposal.candidate, proposal.shapes)
+    unknowns = current.unknowns.with_members([u for u in own if u.name not in current.unknowns.names])
+    members = unknowns.names
+    new = [k for k in range(len(members)) if k >= len(current.unknowns.members)]
+    amplitude = {
+        p.variable: float(a)
+        for p, a in zip(proposal.candidate.coefficients, proposal.amplitudes, strict=True)
+    }
+    start = unknowns.start
+    start[: current.vector.size] = current.vector
+    trials = []
+    for share in (1.0, 0.3, 0.1):
+        trial = start.copy()
+        for variable, value in amplitude.items():
+            trial[members.index(variable)] += share * value
+        trials.append(unknowns.clip(trial))
+    found = bench.residuals(unknowns, np.array(trials), "fit")
+    costs = [np.inf if r is None else float(r @ r) for r in found]
+    best = int(np.argmin(costs))
+    residual = found[best]
+    if residual is None:
+        return None
+    jacobian = np.concatenate([current.jacobian, np.zeros((residual.size, len(new)))], axis=1)
+    steps = np.concatenate([current.steps, np.full(len(new), 1e-2)])
+    jacobian[:, new], steps = columns(bench, unknowns, trials[best], residual, new, steps)
+    fit = refine(
+        bench,
+        unknowns,
+        trials[best],
+        residual=residual,
+        jacobian=jacobian,
+        steps=steps,
+        fresh=new,
+        iterations=iterations,
+        enough=3.0,
+    )
+    return None if fit is None else _scored(bench, proposal, fit, current, held)
+
+
+def go_on(bench: Bench, scored: Scored, current: Fit, held: FloatArray, iterations: int = 4) -> Scored:
+    """The same with further iterations, the Jacobian's columns of the declared parameters kept as in `score`."""
+    fit = scored.fit
+    if fit.converged:
+        return scored
+    again = refine(
+        bench,
+        fit.unknowns,
+        fit.vector,
+        residual=fit.residual,
+        jacobian=fit.jacobian,
+        steps=fit.steps,
+        fresh=list(range(len(current.unknowns.members), len(fit.unknowns.members))),
+        iterations=iterations,
+        enough=3.0,
+    )
+    return scored if again is None else _scored(bench, scored.proposal, again, current, held) or scored
+
+
+def _scored(bench: Bench, proposal: Proposal, fit: Fit, current: Fit, held: FloatArray) -> Scored | None:
+    validate = bench.residuals(fit.unknowns, fit.vector[None, :], "validate")[0]
+    if validate is None:
+        return None
+    trials = bench.of("validate")
+    worse, better = block_squares(trials, held), block_squares(trials, validate)
+    before, after = structure(trials, held), structure(trials, validate)
+    return Scored(
+        proposal=proposal,
+        fit=fit,
+        validate=validate,
+        fit_gain=current.misfit - fit.misfit,
+        held_out_gain=float((worse - better).sum()),
+        consistency=max(consistency(worse - better), relative_consistency(worse, better)),
+        share=(before - after) / before if before > 0.0 else 0.0,
+    )
+
+
+def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scored:
+    """The same with every Jacobian column fresh, and once more with the declared parameters from the drawing.
+
+    A missing effect bends the declared parameters; from there an effect that acts by contact may not find its optimum.
+    """
+    unknowns = choice.fit.unknowns
+    drawing = np.where([u.declared for u in unknowns.members], unknowns.start, choice.fit.vector)
+    fits = [refine(bench, unknowns, choice.fit.vector, steps=choice.fit.steps)]
+    if fits[0] is None or fits[0].misfit > ENOUGH * fits[0].residual.size:
+        fits.append(refine(bench, unknowns, drawing))
+    best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)
+    if best is None:
+        return choice
+    return _scored(bench, choice.proposal, best, current, held) or choice
+
+
+def extended_unknowns(declared: Unknowns, accepted: Sequence[Scored]) -> Unknowns:
+    """The declared parameters and those of the accepted effects, the latter from their own starts."""
+    members = [u for s in accepted for u in unknowns_of(s.candidate, s.proposal.shapes)]
+    return declared.with_members(list({u.name: u for u in members}.values()))
+
+
+def fixed_shapes(accepted: Sequence[Scored]) -> dict[str, float]:
+    """The shapes that no fit changes, by FMU variable, at the values of the accepted proposals."""
+    return {
+        p.variable: s.proposal.shapes[p.name] for s in accepted for p in s.candidate.parameters if p.fixed
+    }

@@ -1,0 +1,231 @@
+"""Damped Gauss-Newton over simulations: Jacobians as one batch, their columns kept while they serve.
+
+Levenberg (1944), Marquardt (1963); what is known beforehand enters as one more residual per unknown.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
+from thsa_cosim.signals import FloatArray
+
+#: A difference step moves the residuals by this much in all (their norm, in standard deviations), or by this share of
+#: their own norm: far from the optimum small steps see the solver's events more than the slope.
+RESPONSE, SHARE = 60.0, 0.1
+SMALLEST, LARGEST = 1e-7, 0.3
+#: Information (of unknowns each scaled to 1) below which a combination of them is not determined at all.
+DETERMINED = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted vector (n,), the residuals (N,) there and their Jacobian (N, n) per ``scale`` of each unknown.
+
+    ``steps`` (n,) are the difference steps, in scales. ``cost``: sum of squares with the prior's.
+    """
+
+    unknowns: Unknowns
+    vector: FloatArray
+    residual: FloatArray
+    jacobian: FloatArray
+    steps: FloatArray
+    cost: float
+    converged: bool
+
+    def at(self, names: Sequence[str]) -> FloatArray:
+        """(m,) fitted values of the named unknowns."""
+        return np.asarray(self.vector[self.unknowns.index(names)])
+
+    @property
+    def misfit(self) -> float:
+        """Sum of squared residuals without the prior's."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def information(self) -> FloatArray:
+        """(n, n) JᵀJ + prior, per scale."""
+        prior = self.unknowns.precision * self.unknowns.scale
+        return np.asarray(self.jacobian.T @ self.jacobian + np.diag(prior**2))
+
+    @property
+    def inflation(self) -> float:
+        """Mean squared residual in variances of the noise, at least 1: how much less the recordings say for it."""
+        return max(1.0, self.misfit / self.residual.size)
+
+    def covariance(self, inflation: float = 1.0) -> FloatArray:
+        """(n, n) covariance, per scale; infinite on the diagonal of what nothing determines.
+
+        ``inflation`` widens what the recordings say; what the drawing says stays as it is.
+        """
+        prior = self.unknowns.precision * self.unknowns.scale
+        information = self.jacobian.T @ self.jacobian / inflation + np.diag(prior**2)
+        size = np.sqrt(np.diag(information))
+        size[size == 0.0] = 1.0
+        values, vectors = np.linalg.eigh(information / np.outer(size, size))
+        known = values > DETERMINED
+        covariance = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(size, size)
+        open_ = np.sum(vectors[:, ~known] ** 2, axis=1) > 1e-6
+        covariance[open_, open_] = np.inf
+        return np.asarray(covariance)
+
+    def stderr(self, inflation: float = 1.0) -> FloatArray:
+        """(n,) standard errors in the unknowns' units, by `covariance`; infinite where nothing determines one."""
+        return np.asarray(np.sqrt(np.diag(self.covariance(inflation))) * self.unknowns.scale)
+
+
+def cost_of(unknowns: Unknowns, vector: FloatArray, residual: FloatArray) -> float:
+    """Sum of squares of residuals and prior."""
+    prior = unknowns.prior(vector)
+    return float(residual @ residual + prior @ prior)
+
+
+def columns(
+    bench: Bench,
+    unknowns: Unknowns,
+    vector: FloatArray,
+    centre: FloatArray,
+    which: list[int],
+    steps: FloatArray,
+    response: float | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Jacobian columns (N, len(which)) per scale by one-sided differences, and the steps that serve next time.
+
+    A column whose response was far from ``response`` (default: RESPONSE, or SHARE of the residuals' norm) is taken
+    again with a better step; one that cannot be simulated is zero.
+    """
+    found = np.zeros((centre.size, len(which)))
+    steps = steps.copy()
+    aim = max(RESPONSE, SHARE * float(np.linalg.norm(centre))) if response is None else response
+    open_ = list(range(len(which)))
+    for _ in range(3):
+        vectors = np.repeat(vector[None, :], len(open_), axis=0)
+        taken = np.zeros(len(open_))
+        for row, k in enumerate(open_):
+            j = which[k]
+            vectors[row, j] += steps[j] * unknowns.scale[j]
+            vectors[row] = unknowns.clip(vectors[row])
+            if abs(vectors[row, j] - vector[j]) < 0.5 * abs(steps[j]) * unknowns.scale[j]:
+                vectors[row, j] = vector[j] - steps[j] * unknowns.scale[j]
+                vectors[row] = unknowns.clip(vectors[row])
+            taken[row] = (vectors[row, j] - vector[j]) / unknowns.scale[j]
+        again = []
+        for row, (k, residual) in enumerate(
+            zip(open_, bench.residuals(unknowns, vectors, "fit"), strict=True)
+        ):
+            j = which[k]
+            if residual is None or taken[row] == 0.0:
+                steps[j] *= 0.1
+                again.append(k)
+                continue
+            difference = residual - centre
+            norm = float(np.linalg.norm(difference))
+            found[:, k] = difference / taken[row]
+            wanted = float(np.clip(steps[j] * aim / max(norm, 1e-12), SMALLEST, LARGEST))
+            if not 0.1 * aim < norm < 10.0 * aim and not 0.5 < wanted / steps[j] < 2.0:
+                again.append(k)
+            steps[j] = wanted
+        open_ = again
+        if not open_:
+            break
+    return found, steps
+
+
+def refine(
+    bench: Bench,
+    unknowns: Unknowns,
+    vector: FloatArray,
+    *,
+    residual: FloatArray | None = None,
+    jacobian: FloatArray | None = None,
+    steps: FloatArray | None = None,
+    fresh: list[int] | None = None,
+    iterations: int = 8,
+    enough: float = 1.0,
+) -> Fit | None:
+    """Minimise the fit recordings' squared residuals from ``vector`` (n,).
+
+    ``jacobian`` (N, n) is used as given at the start; in later iterations the columns ``fresh`` (default all) are
+    taken anew. Stops when a step promises or brings less than ``enough``. None if the start cannot be simulated.
+    """
+    n = len(unknowns.members)
+    vector = unknowns.clip(vector)
+    if residual is None:
+        residual = bench.residuals(unknowns, vector[None, :], "fit")[0]
+        if residual is None:
+            return None
+    steps = np.full(n, 1e-2) if steps is None else steps
+    renew = list(range(n)) if fresh is None else fresh
+    jacobian = np.zeros((residual.size, n)) if jacobian is None else jacobian.copy()
+    cost, damping, converged, stale = cost_of(unknowns, vector, residual), 1e-6, False, not jacobian.any()
+    response: float | None = None
+    for _ in range(iterations):
+        if stale:
+            new, steps = columns(bench, unknowns, vector, residual, renew, steps, response)
+            jacobian[:, renew] = new
+        state = Fit(unknowns, vector, residual, jacobian, steps, cost, converged)
+        better, promised, damping = _step(bench, state, damping)
+        if better is None:
+            if promised < enough:
+                converged = True
+                break
+            if response is not None:
+                break
+            response, stale = 5.0 * max(RESPONSE, SHARE * float(np.linalg.norm(residual))), True
+            continue
+        gained = cost - better.cost
+        vector, residual, cost = better.vector, better.residual, better.cost
+        response, stale = None, True
+        if gained < enough:
+            converged = True
+            break
+    return Fit(unknowns, vector, residual, jacobian, steps, cost, converged)
+
+
+def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, float]:
+    """One damped step: the better fit or None, the decrease that was promised, the next damping."""
+    unknowns, scale = state.unknowns, state.unknowns.scale
+    information = state.information
+    gradient = state.jacobian.T @ state.residual + unknowns.prior(state.vector) * unknowns.precision * scale
+    diagonal = np.diag(information).copy()
+    diagonal[diagonal <= 0.0] = 1.0
+    for _ in range(3):
+        dampings = [damping * 10.0**k for k in (0, 2, 4)]
+        trials = [_bounded(state, information + np.diag((d + 1e-12) * diagonal), gradient) for d in dampings]
+        step = (trials[0] - state.vector) / scale
+        promised = float(-2.0 * gradient @ step - step @ information @ step)
+        if promised < 1e-3:
+            return None, promised, damping
+        found = bench.residuals(unknowns, np.array(trials), "fit")
+        costs = [np.inf if r is None else cost_of(unknowns, v, r) for v, r in zip(trials, found, strict=True)]
+        best = int(np.argmin(costs))
+        residual = found[best]
+        if costs[best] < state.cost and residual is not None:
+            damping = max(1e-9, dampings[best] * (0.1 if best == 0 else 1.0))
+            return replace(state, vector=trials[best], residual=residual, cost=costs[best]), promised, damping
+        damping = dampings[-1] * 100.0
+    return None, promised, damping
+
+
+def _bounded(state: Fit, curvature: FloatArray, gradient: FloatArray) -> FloatArray:
+    """(n,) where the quadratic model is least; unknowns that leave their bounds stay there, the others make up for it.
+
+    Clipping alone would leave the others where they only make sense together with what was clipped.
+    """
+    unknowns = state.unknowns
+    step = np.zeros(gradient.size)
+    free = np.ones(gradient.size, dtype=bool)
+    while free.any():
+        pull = gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
+        step[free] = -cho_solve(cho_factor(curvature[np.ix_(free, free)]), pull)
+        wanted = state.vector + step * unknowns.scale
+        held = unknowns.clip(wanted)
+        left = free & (held != wanted)
+        if not left.any():
+            break
+        step[left] = ((held - state.vector) / unknowns.scale)[left]
+        free &= ~left
+    return unknowns.clip(state.vector + step * unknowns.scale)

@@ -1,0 +1,62 @@
+"""A model identified on the fit recordings and scored on the held-out ones: declared and extended alike."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
+from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
+from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
+from thsa_cosim.errors import StudyError
+from thsa_cosim.scenario import SimulationSpec, open_runner
+from thsa_cosim.signals import FloatArray, Signals
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """A model identified on the fit recordings: its FMU, the fit, the held-out residuals (N,), and all its signals."""
+
+    fmu: Path
+    fit: Fit
+    validate: FloatArray
+    trials: tuple[Trial, ...]
+    signals: dict[str, Signals | None]
+    evaluations: int
+    failures: dict[str, int]
+
+
+def identify_model(
+    fmu: Path,
+    trials: tuple[Trial, ...],
+    unknowns: Unknowns,
+    starts: Sequence[FloatArray],
+    simulation: SimulationSpec,
+    workers: int,
+    cluster: str | None,
+) -> Identified:
+    """Identify ``unknowns`` of an FMU on the fit recordings from every one of ``starts``; the best fit counts.
+
+    StudyError if the FMU cannot be simulated at any start.
+    """
+    own = with_fmu(trials, fmu)
+    with open_runner(simulation, [t.experiment for t in own], workers, cluster) as runner:
+        bench = Bench(runner, own)
+        found = bench.residuals(unknowns, np.array(starts), "fit")
+        fits: list[Fit] = []
+        for residual, vector in zip(found, starts, strict=True):
+            known = min((f.cost for f in fits), default=np.inf)
+            if residual is None or (fits and known <= cost_of(unknowns, vector, residual) + 1.0):
+                continue  # the fit so far is better than this start
+            fit = refine(bench, unknowns, vector, residual=residual, iterations=12)
+            fits += [] if fit is None else [fit]
+        best = min(fits, key=lambda f: f.cost, default=None)
+        validate = None if best is None else bench.residuals(unknowns, best.vector[None, :], "validate")[0]
+        if best is None or validate is None:
+            reason = next(iter(bench.failures), "no run succeeded")
+            raise StudyError(f"{fmu.name} cannot be identified: {reason}")
+        return Identified(
+            fmu, best, validate, own, bench.signals(unknowns, best.vector), bench.evaluations, bench.failures
+        )

@@ -1,0 +1,89 @@
+"""The recordings of a scenario as trials: simulations that a model has to match, to fit or to judge."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+from thsa_cosim.batch import Experiment, Wrapper
+from thsa_cosim.costs.channels import ResidualReducer
+from thsa_cosim.errors import ScenarioError
+from thsa_cosim.identify.problem import Case, build_case
+from thsa_cosim.scenario import DiagnoseSpec, Scenario
+
+Part = Literal["fit", "validate"]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A recording as a simulation, the part that it plays, and its temperature's label."""
+
+    case: Case
+    part: Part
+    group: str
+
+    @property
+    def experiment(self) -> Experiment:
+        """The simulation that returns residuals in standard deviations of the noise."""
+        return self.case.experiment(self.name, ResidualReducer(self.case.channels))
+
+    @property
+    def name(self) -> str:
+        """Name of the experiment."""
+        return f"{self.part}/{self.case.name}"
+
+
+def spec_of(scenario: Scenario) -> DiagnoseSpec:
+    """The scenario's ``[diagnose]``; ScenarioError for a scenario of another kind or without held-out recordings."""
+    if scenario.diagnose is None:
+        raise ScenarioError(
+            f"{scenario.path} is a scenario of kind {scenario.kind!r}; a diagnosis needs kind = 'diagnose'."
+        )
+    if not scenario.validate:
+        raise ScenarioError(
+            f"{scenario.path}: recordings.validate names no recording; a diagnosis is judged by recordings that no fit"
+            " touched, so add one (or --validate FILE)."
+        )
+    return scenario.diagnose
+
+
+def group_of(temperature: float | None, round_to: float) -> str:
+    """Label of the recordings that share a temperature."""
+    return "all" if temperature is None else f"{round(temperature / round_to) * round_to + 0.0:.6g} degC"
+
+
+def trials_of(scenario: Scenario) -> tuple[Trial, ...]:
+    """Every recording as a simulation of the scenario's own FMU."""
+    trials = []
+    for part, recordings in (("fit", scenario.fit), ("validate", scenario.validate)):
+        for recording in recordings:
+            case = build_case(scenario, recording, scenario.fixed_for(recording.name))
+            group = group_of(recording.temperature_degC, scenario.round_to)
+            trials.append(Trial(case, "fit" if part == "fit" else "validate", group))
+    known = {t.group for t in trials if t.part == "fit"}
+    for trial in trials:
+        if trial.group not in known:
+            raise ScenarioError(
+                f"{trial.case.name} was recorded at {trial.group}, where there is no fit recording; add one, or"
+                " leave it out."
+            )
+    return tuple(trials)
+
+
+def with_fmu(
+    trials: tuple[Trial, ...], fmu: Path, fixed: Mapping[str, float] | None = None
+) -> tuple[Trial, ...]:
+    """The same recordings driving another FMU, with further fixed start values."""
+    return tuple(
+        replace(t, case=replace(t.case, fmu=fmu, fixed={**t.case.fixed, **(fixed or {})})) for t in trials
+    )
+
+
+def with_wrapper(
+    trials: tuple[Trial, ...], wrapper: Wrapper, fixed: Mapping[str, float] | None = None
+) -> tuple[Trial, ...]:
+    """The same recordings with effects around the FMU, with further fixed start values."""
+    return tuple(
+        replace(t, case=replace(t.case, wrapper=wrapper, fixed={**t.case.fixed, **(fixed or {})}))
+        for t in trials
+    )

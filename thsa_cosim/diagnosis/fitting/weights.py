@@ -1,0 +1,46 @@
+"""Channels weighed by what a model leaves in them, so that no channel's structure outshouts the others'.
+
+The most likely parameters where the sizes of the residuals are unknown (L. Ljung, System Identification, 2nd edition,
+section 7.4): a channel whose rms exceeds the noise counts as if that were its noise. Without it position, which sums
+up every error of speed, decides alone as long as an effect is missing.
+"""
+
+import numpy as np
+
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit, refine
+from thsa_cosim.diagnosis.fitting.structure import split, structure
+from thsa_cosim.diagnosis.fitting.trials import Part
+from thsa_cosim.signals import FloatArray
+
+#: Levels that differ by less than this factor are the same.
+SAME = 1.2
+
+
+class ChannelWeights:
+    """The weights of a bench, and the declared model's held-out residuals ``base_held`` under them."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.base_held: FloatArray = np.zeros(0)
+        self._bench = bench
+
+    def weigh(self, fit: Fit) -> tuple[Fit, FloatArray | None]:
+        """Weigh by what ``fit`` leaves: the fit under these weights and its held-out residuals."""
+        bench, before, after = self._bench, self._bench.weights, {}
+        for name, parts in split(bench.of("fit"), self.plain(fit.residual, "fit")).items():
+            after[name] = 1.0 / max(1.0, float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
+        if any(not 1.0 / SAME < after[name] / before.get(name, 1.0) < SAME for name in after):
+            plain = self.plain(self.base_held, "validate") if self.base_held.size else self.base_held
+            bench.weights = after
+            if plain.size:
+                self.base_held = plain * bench.factors("validate")
+            fit = refine(bench, fit.unknowns, fit.vector, steps=fit.steps, iterations=4) or fit
+        return fit, bench.residuals(fit.unknowns, fit.vector[None, :], "validate")[0]
+
+    def plain(self, residual: FloatArray, part: Part) -> FloatArray:
+        """``residual`` (N,) without the weights, in standard deviations of the noise."""
+        return residual / self._bench.factors(part)
+
+    def left(self, held: FloatArray) -> float:
+        """Mean squared structure of held-out residuals (N,), in variances of the noise."""
+        return structure(self._bench.of("validate"), self.plain(held, "validate")) / held.size

@@ -1,0 +1,173 @@
+"""A diagnosis as result.json (the contract of the command line) and the files beside it."""
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from thsa_cosim.diagnosis.results import ChannelError, DiagnosisResult, EmpiricalLaw, Errors, Value
+from thsa_cosim.identify import ForceBalance
+from thsa_cosim.report.files import RESULT, write_json
+from thsa_cosim.report.page.pictures import write_pictures
+from thsa_cosim.report.signal_files import write_signals
+
+
+def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
+    """What result.json holds; paths of what the study wrote are relative to ``folder``."""
+    return {
+        "kind": "diagnose",
+        "title": result.title,
+        "status": result.status,
+        "verdict": result.verdict,
+        "effects": [
+            {
+                "name": e.name,
+                "title": e.title,
+                "parameters": _values(e.parameters),
+                "equivalent": list(e.equivalent),
+                "probability": e.probability,
+            }
+            for e in result.effects
+        ],
+        "before": {**_errors(result.before), "recordings": _errors(result.recordings_before)},
+        "after": {**_errors(result.after), "recordings": _errors(result.recordings_after)},
+        "unexplained": result.unexplained,
+        "model": None if result.model is None else result.model.name,
+        "fmu": None if result.extended_fmu is None else result.extended_fmu.name,
+        "wrapper": None if result.wrapper is None else result.wrapper.name,
+        "parameters": {
+            "before": _values(result.declared_before),
+            "after": _values(result.declared_after),
+        },
+        "force_residual": None
+        if result.force_before is None
+        else _force(result.force_before, result.force_after),
+        "threshold": result.threshold,
+        "candidates": [
+            {
+                "name": j.name,
+                "variant": j.variant,
+                "round": j.round,
+                "fit_gain": j.fit_gain,
+                "held_out_gain": j.held_out_gain,
+                "p_value": j.p_value,
+                "parameters": _values(j.parameters),
+                "decision": j.decision,
+                "reason": j.reason,
+            }
+            for j in result.judged
+        ],
+        "not_testable": [
+            {"name": j.variant, "reason": j.reason} for j in result.judged if j.decision == "not testable"
+        ],
+        "balance": [
+            {
+                "equation": b.equation,
+                "unit": b.unit,
+                "rmse": b.rmse,
+                "noise": b.noise,
+                "share": b.share,
+                "at_fault": b.at_fault,
+            }
+            for b in result.balances
+        ],
+        "empirical": None if result.empirical is None else _law(result.empirical),
+        "equivalence": [{"names": list(c.names), "angle_deg": c.angle_deg} for c in result.equivalence],
+        "experiment": None
+        if result.experiment is None
+        else {
+            "name": result.experiment.name,
+            "rivals": list(result.experiment.rivals),
+            "distance": result.experiment.distance,
+            "present": result.experiment.present,
+            "file": "experiment.csv",
+        },
+        "notes": list(result.notes),
+        "seed": result.seed,
+        "evaluations": result.evaluations,
+        "failures": dict(result.failures),
+        "declared_fmu": {"path": str(result.fmu), "sha256": result.fmu_sha256},
+        "scenario": str(result.scenario),
+        "version": result.version,
+    }
+
+
+def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:
+    """Write result.json, candidates.csv, structure.csv, experiment.csv and the signals; the paths."""
+    content = diagnosis_json(result, folder)
+    files = []
+    table = pd.DataFrame(
+        [
+            {**{k: v for k, v in c.items() if k != "parameters"}, "parameters": json.dumps(c["parameters"])}
+            for c in content["candidates"]
+        ]
+    )
+    table.to_csv(folder / "candidates.csv", index=False)
+    files.append(folder / "candidates.csv")
+    pd.DataFrame([vars(d) for d in result.dependence]).to_csv(folder / "structure.csv", index=False)
+    files.append(folder / "structure.csv")
+    if result.experiment is not None:
+        result.experiment.inputs.to_frame().to_csv(folder / "experiment.csv")
+        files.append(folder / "experiment.csv")
+    for c in result.comparisons:
+        models = {"before": c.before, "after": c.after}
+        variants = {"measured": c.measured, **{k: s for k, s in models.items() if s is not None}}
+        files.append(write_signals(folder, c.part, c.name, variants))
+    files += [p for p in (result.model, result.extended_fmu, result.wrapper) if p is not None]
+    write_json(folder / RESULT, content)
+    return [*files, folder / RESULT, *write_pictures(folder)]
+
+
+def _law(law: EmpiricalLaw) -> dict[str, Any]:
+    return {
+        "slot": law.terms[0].slot,
+        "terms": [
+            {
+                "slot": t.slot,
+                "term": t.term,
+                "coefficient": t.coefficient.value,
+                "unit": t.coefficient.unit,
+                "stderr": t.coefficient.stderr,
+            }
+            for t in law.terms
+        ],
+        "held_out_gain": law.held_out_gain,
+        "added": law.added,
+    }
+
+
+def _force(before: ForceBalance, after: ForceBalance | None) -> dict[str, Any]:
+    laps = before.repeatability
+    return {
+        "unit": before.unit,
+        "band_Hz": before.band,
+        "before": dict(before.rms),
+        "after": {} if after is None else dict(after.rms),
+        "repeatability": None if math.isnan(laps) else laps,
+    }
+
+
+def _values(values: Mapping[str, Value]) -> dict[str, dict[str, Any]]:
+    return {name: _value(v) for name, v in values.items()}
+
+
+def _value(value: Value) -> dict[str, Any]:
+    """A value; without a standard error where there is none, with a reason where it is not determined."""
+    known = {
+        "value": value.value,
+        "unit": value.unit,
+        "stderr": value.stderr if math.isfinite(value.stderr) else None,
+        "identifiable": value.identifiable,
+    }
+    return known if value.identifiable else {**known, "reason": value.reason}
+
+
+def _errors(errors: Errors) -> dict[str, dict[str, dict[str, float]]]:
+    return {part: {name: _error(e) for name, e in channels.items()} for part, channels in errors.items()}
+
+
+def _error(error: ChannelError) -> dict[str, float]:
+    return {"rmse": error.rmse, "noise": error.noise, "structure": error.structure}

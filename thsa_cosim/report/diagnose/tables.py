@@ -1,0 +1,178 @@
+"""What the command line prints at the end of a diagnosis (rich), from what result.json holds."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from thsa_cosim.report.parts.text import number
+
+Content = Mapping[str, Any]
+
+
+def sentence(content: Content) -> str:
+    """The verdict as a test engineer would say it."""
+    if content["verdict"] == "no-missing-effect":
+        return "No missing effect: what is left is noise, or declared parameters that were tuned again."
+    effects = content["effects"]
+    found = " and ".join(f"{e['title'][0].lower()}{e['title'][1:]} ({e['name']})" for e in effects)
+    if content["verdict"] == "missing-effect":
+        text = f"The model lacks {found}."
+        ties = [f"{e['name']} from {', '.join(e['equivalent'])}" for e in effects if e["equivalent"]]
+        if ties:
+            text += f" These recordings cannot tell {' and '.join(ties)}."
+        return text
+    if content["verdict"] == "not-tested":
+        return "No effect could be tried on this model and these recordings: see the notes."
+    share = f"{100 * content['unexplained']:.0f} % of the repeatable residual in the worst signal"
+    if found:
+        text = f"The model lacks {found}; beside that, structure is left that no effect of the catalogue explains"
+        return f"{text} ({share})."
+    return f"Structure is left that no effect of the catalogue explains ({share})."
+
+
+def print_diagnosis(console: Console, content: Content) -> None:
+    """Print the verdict, the effects, the errors before and after, and the best candidates."""
+    console.print(Text(sentence(content), style="bold"), highlight=False)
+    if content["effects"]:
+        console.print(_effects(content))
+    console.print(_errors(content))
+    for text in (
+        *_forces(content),
+        *_faults(content),
+        *empirical_law(content),
+        *_undetermined(content),
+        *_alike(content),
+        *_advice(content),
+    ):
+        console.print(Text(text), highlight=False)
+    console.print(_candidates(content))
+    for note in content["notes"]:
+        console.print(Text(f"note: {note}"), highlight=False)
+
+
+def _effects(content: Content) -> Table:
+    table = Table(title="Effects added to the model", title_justify="left")
+    for heading in ("effect", "parameter", "value", "standard error", "unit"):
+        table.add_column(heading, justify="right" if heading in ("value", "standard error") else "left")
+    for effect in content["effects"]:
+        for name, value in effect["parameters"].items():
+            error = number(value["stderr"], 2) + (
+                "" if value.get("identifiable", True) else " (not determined)"
+            )
+            table.add_row(Text(effect["name"]), name, number(value["value"]), error, value["unit"])
+    return table
+
+
+def _errors(content: Content) -> Table:
+    table = Table(title="Error on held-out recordings, as multiples of the noise", title_justify="left")
+    table.add_column("signal")
+    for heading in ("declared model", "extended model", "noise"):
+        table.add_column(heading, justify="right")
+    for channel, error in content["before"].get("validate", {}).items():
+        after = content["after"].get("validate", {}).get(channel)
+        table.add_row(
+            Text(channel),
+            number(error["rmse"] / error["noise"], 3),
+            number(None if after is None else after["rmse"] / after["noise"], 3),
+            number(error["noise"], 3),
+        )
+    return table
+
+
+def _forces(content: Content) -> list[str]:
+    """The force residual of both models, if the scenario asks for it."""
+    force = content.get("force_residual")
+    if not force:
+        return []
+    unit, laps = force["unit"], force["repeatability"]
+    found = []
+    for model in ("before", "after"):
+        parts = ", ".join(f"{number(rms, 3)} {unit} ({part})" for part, rms in force[model].items())
+        if parts:
+            name = "declared" if model == "before" else "extended"
+            found.append(f"Force residual below {force['band_Hz']:g} Hz, {name} model: {parts}.")
+    return found + ([] if laps is None else [f"Laps differ by {number(laps, 2)} {unit}."])
+
+
+def _faults(content: Content) -> list[str]:
+    """The balance equations that do not close."""
+    return [
+        f"The balance {b['equation']} does not close: {b['rmse']:.3g} {b['unit']}, where the sensors' noise makes"
+        f" {b['noise']:.3g}."
+        for b in content["balance"]
+        if b["at_fault"]
+    ]
+
+
+def empirical_law(content: Content) -> list[str]:
+    """What describes the structure that no effect explains, as an equation in the slot's variables."""
+    law = content["empirical"]
+    if law is None:
+        return []
+    terms = " + ".join(
+        f"({number(t['coefficient'], 3)} +- {number(t['stderr'], 1)}{_unit(t['unit'])}) {t['term']} at {t['slot']}"
+        for t in law["terms"]
+    )
+    fate = (
+        "It was added to the model."
+        if law["added"]
+        else "empirical = true in [diagnose] adds it to the model."
+    )
+    return [
+        f"Empirical law, which describes and does not explain: {terms}; held-out gain"
+        f" {number(law['held_out_gain'], 3)} variances of the noise. {fate}"
+    ]
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
+
+
+def _alike(content: Content) -> list[str]:
+    """What would look like a named effect in these recordings, at an ordinary size; the page has all classes."""
+    named = {e["name"] for e in content["effects"]}
+    return [
+        f"These recordings could not tell apart at an ordinary size: {', '.join(c['names'])} (principal angle"
+        f" {number(c['angle_deg'], 2)} deg)."
+        for c in content["equivalence"]
+        if named & set(c["names"])
+    ]
+
+
+def _advice(content: Content) -> list[str]:
+    """The experiment that would tell rivals apart, where there are any."""
+    best = content["experiment"]
+    rivals = [name for e in content["effects"] for name in e["equivalent"]]
+    if best is None or not rivals:
+        return []
+    return [f"To tell {' from '.join(best['rivals'])}, run {best['name']} ({best['file']})."]
+
+
+def _undetermined(content: Content) -> list[str]:
+    """Values of the model as it ends that the recordings do not determine, with why."""
+    declared = content["parameters"]["after" if content["effects"] else "before"]
+    values = [
+        (name, value) for name, value in declared.items() if value.get("reason", "").startswith("it ended")
+    ]
+    for effect in content["effects"]:
+        values += [(f"{effect['name']}: {n}", v) for n, v in effect["parameters"].items() if v.get("reason")]
+    return [f"Not determined: {name}, {value['reason']}." for name, value in values]
+
+
+def _candidates(content: Content) -> Table:
+    """What was refined in each round, and the most promising of the first."""
+    table = Table(title="Candidates, the most telling first", title_justify="left")
+    for heading in ("round", "candidate", "gain", "held-out gain", "decision", "reason"):
+        right = "gain" in heading or heading == "round"
+        table.add_column(heading, justify="right" if right else "left", overflow="fold")
+    rounds: dict[int, list[Mapping[str, Any]]] = {}
+    for one in content["candidates"]:
+        rounds.setdefault(one["round"], []).append(one)
+    for number_, own in rounds.items():
+        for one in own[:8] if number_ == 1 else [c for c in own if c["held_out_gain"] is not None][:4]:
+            gains = number(one["fit_gain"], 3), number(one["held_out_gain"], 3)
+            table.add_row(str(number_), Text(one["variant"]), *gains, one["decision"], Text(one["reason"]))
+    return table

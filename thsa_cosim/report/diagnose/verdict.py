@@ -1,0 +1,260 @@
+"""A diagnosis: the verdict with the effects it names, and whether they help on recordings that no fit has seen."""
+
+from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.parts.chart import AFTER, BEFORE, Chart
+from thsa_cosim.report.parts.comparison import noise_ratio, ratio_mark, recording_folds, role_text
+from thsa_cosim.report.parts.content import Block, Cell, Column, Facts, Figure, Fold, Section, Table, Text
+from thsa_cosim.report.parts.text import (
+    DASH,
+    count,
+    listing,
+    number,
+    number_cell,
+    percent,
+    plus_minus,
+    significant_cell,
+    text_cell,
+)
+from thsa_cosim.report.signal_files import read_signals, signal_paths, signal_units
+
+_VERDICTS = {
+    "missing-effect": "The model lacks {effects}: added to it, the error on held-out recordings falls.",
+    "no-missing-effect": "The model lacks nothing that these recordings show: what is left is noise, or declared"
+    " parameters that were tuned again.",
+    "unexplained-structure": "Something repeatable is left that no effect of the catalogue explains; see on what it"
+    " depends.",
+    "not-tested": "No effect could be tried on this model and these recordings.",
+}
+
+
+def verdict(result: Json) -> tuple[Block, ...]:
+    """What the summary says first: the verdict, each effect with its parameters, and what would tell rivals apart."""
+    word = str(result["verdict"])
+    effects: list[Json] = result.get("effects", [])
+    names = listing([_name(e) for e in effects])
+    sentence = _VERDICTS.get(word, word).format(effects=names)
+    if word == "unexplained-structure" and effects:
+        sentence = f"The model lacks {names}. Beside that, s" + sentence[1:]
+    blocks: list[Block] = [Text(sentence, "good" if word == "no-missing-effect" else "bad")]
+    if effects:
+        blocks.append(_effects_table(effects))
+    facts = []
+    if result.get("unexplained") is not None:
+        facts.append(
+            (
+                "left",
+                f"{percent(result['unexplained'])} of the repeatable residual is left in the worst signal.",
+            )
+        )
+    alike = [f"{e['name']} from {listing(e['equivalent'])}" for e in effects if e.get("equivalent")]
+    if alike:
+        facts.append(("not told apart", f"These recordings cannot tell {listing(alike)}."))
+    facts += _experiment(result.get("experiment"))
+    files = [str(result[key]) for key in ("model", "fmu") if result.get(key)]
+    if files:
+        facts.append(("extended model", ", ".join(files)))
+    return (*blocks, Facts(facts)) if facts else tuple(blocks)
+
+
+def held_out(result: Json) -> str:
+    """One sentence on how far the error on held-out recordings fell; empty without such recordings."""
+    ratios = [
+        [r for e in result.get(when, {}).get("validate", {}).values() if (r := noise_ratio(e)) is not None]
+        for when in ("before", "after")
+    ]
+    if not ratios[0]:
+        return ""
+    now = number(max(ratios[0]), 3)
+    if not ratios[1]:
+        return f"On recordings that no fit has seen the largest error is {now} × the sensor's noise."
+    return (
+        f"On recordings that no fit has seen the largest error falls from {now} × the sensor's noise to"
+        f" {number(max(ratios[1]), 3)} × noise."
+    )
+
+
+def before_after(part: Part) -> Section | None:
+    """Errors of the declared and the extended model, as multiples of the noise; None before the end."""
+    result = part.result or {}
+    rows: list[_Pair] = []
+    for role in ("fit", "validate"):
+        before, after = result.get("before", {}).get(role, {}), result.get("after", {}).get(role, {})
+        rows += [(role, channel, error, after.get(channel, {})) for channel, error in before.items()]
+    if not rows:
+        return None
+    blocks: list[Block] = [_ratios_figure(part, rows), _errors_table(rows, signal_units(part.folder))]
+    declared: Json = result.get("parameters") or {}
+    if declared.get("before"):
+        blocks.append(_declared_table(declared["before"], declared.get("after") or {}))
+    return Section(f"{part.prefix}before-after", "Before and after", tuple(blocks))
+
+
+_Pair = tuple[str, str, Json, Json]
+"""Role, channel, and its error before and after; empty where there is no after."""
+
+
+def _errors_table(rows: list[_Pair], units: Json) -> Table:
+    columns = [Column(text, numeric=False) for text in ("recordings", "signal", "unit")]
+    columns += [
+        Column(text) for text in ("rmse before", "after", "noise (1 σ)", "before / noise", "after / noise")
+    ]
+    columns += [Column(text) for text in ("structure before", "after")]
+    table = []
+    for role, channel, before, after in rows:
+        ratios = [noise_ratio(error) if error else None for error in (before, after)]
+        errors = (before.get("rmse"), after.get("rmse"), before.get("noise"))
+        table.append(
+            (
+                text_cell(role_text(role)),
+                text_cell(channel),
+                text_cell(before.get("unit") or units.get(channel, "")),
+                *(significant_cell(v) for v in errors),
+                significant_cell(ratios[0]),
+                significant_cell(ratios[1], 3, ratio_mark(ratios[1])),
+                *(significant_cell(error.get("structure"), 2) for error in (before, after)),
+            )
+        )
+    note = (
+        "Before: the declared model, its parameters identified again. After: the extended model likewise. Structure:"
+        " the part of the residual that is no noise."
+    )
+    return Table("Errors before and after", columns, table, note)
+
+
+def _declared_table(before: Json, after: Json) -> Table:
+    columns = [Column("declared parameter", numeric=False), Column("unit", numeric=False)]
+    columns += [Column("before"), Column("after")]
+    rows = []
+    for name, value in before.items():
+        own = [value, after.get(name) or {}]
+        cells = [Cell(plus_minus(v.get("value"), v.get("stderr")), v.get("value")) for v in own]
+        rows.append((text_cell(name), text_cell(value.get("unit", "")), *cells))
+    return Table(
+        "Declared parameters, identified again with either model ± one standard error", columns, rows
+    )
+
+
+def recordings(part: Part) -> Section | None:
+    """Measured, before and after, for every recording and channel."""
+    found = [read_signals(path) for path in signal_paths(part.folder)]
+    if not found:
+        return None
+    return Section(f"{part.prefix}signals", "Measured against simulated", tuple(recording_folds(part, found)))
+
+
+def candidates(part: Part) -> Section | None:
+    """Every effect that was weighed, and those that these recordings cannot test."""
+    result = part.result or {}
+    weighed: list[Json] = [c for c in result.get("candidates", []) if c.get("decision") != "not testable"]
+    refined = [c for c in weighed if c.get("held_out_gain") is not None]
+    others = [c for c in weighed if c.get("held_out_gain") is None]
+    skipped: list[Json] = result.get("not_testable", [])
+    blocks: list[Block] = []
+    if refined:
+        blocks.append(
+            _candidates_table("Effects that were fitted and scored on held-out recordings", refined)
+        )
+    if others:
+        table = _candidates_table("Effects that promised too little to be fitted", others)
+        blocks.append(Fold(f"{count(len(others), 'effect')} that promised too little to be fitted", (table,)))
+    if skipped:
+        rows = [(text_cell(s["name"]), text_cell(s.get("reason", ""))) for s in skipped]
+        columns = (Column("effect", numeric=False), Column("why not", numeric=False))
+        blocks.append(Table("Effects that these recordings cannot test", columns, rows))
+    alike: list[Json] = result.get("equivalence", [])
+    if alike:
+        rows = [(text_cell(listing(c["names"])), number_cell(c["angle_deg"], 2)) for c in alike]
+        columns = (Column("effects", numeric=False), Column("principal angle [deg]"))
+        note = "At an ordinary size; in the first round. The angle is between what they do to the signals."
+        blocks.append(Table("Effects that would look alike in these recordings", columns, rows, note))
+    return Section(f"{part.prefix}candidates", "Effects that were weighed", tuple(blocks)) if blocks else None
+
+
+def _effects_table(effects: list[Json]) -> Table:
+    columns = [Column("effect", numeric=False), Column("probability"), Column("parameter", numeric=False)]
+    columns += [Column("value"), Column("unit", numeric=False), Column("cannot be told from", numeric=False)]
+    rows = []
+    for effect in effects:
+        likely, alike = effect.get("probability"), listing(effect.get("equivalent") or [])
+        named = [text_cell(_name(effect)), Cell(_probability(likely), likely)]
+        if not effect.get("parameters"):
+            rows.append((*named, text_cell(DASH), Cell(DASH), text_cell(""), text_cell(alike)))
+        for name, value in effect.get("parameters", {}).items():
+            text = plus_minus(value["value"], value.get("stderr"))
+            own = (text_cell(name), Cell(text, value["value"]), text_cell(value.get("unit", "")))
+            rows.append((*named, *own, text_cell(alike)))
+    return Table("What came out: effects with their parameters ± one standard error", columns, rows)
+
+
+def _probability(share: float | None) -> str:
+    """``99 %``; never 100 %, of which no recording makes sure."""
+    return "> 99.9 %" if share is not None and share > 0.999 else percent(share, 3)
+
+
+def _name(effect: Json) -> str:
+    """``backlash (Backlash of the screw)``."""
+    return f"{effect['name']} ({effect['title']})" if effect.get("title") else str(effect["name"])
+
+
+def _candidates_table(title: str, weighed: list[Json]) -> Table:
+    columns = [Column("round"), Column("effect", numeric=False)]
+    columns += [Column("gain of the fit"), Column("held-out gain"), Column("p-value")]
+    columns += [Column(text, numeric=False) for text in ("parameters", "decision", "because")]
+    marks = {"accepted": "good", "rival": "good"}
+    rows = [
+        (
+            number_cell(one.get("round")),
+            text_cell(one.get("variant") or one["name"]),
+            number_cell(one.get("fit_gain"), 3),
+            number_cell(one.get("held_out_gain"), 3),
+            number_cell(one.get("p_value"), 2),
+            text_cell(_values(one.get("parameters") or {})),
+            text_cell(one.get("decision", ""), marks.get(one.get("decision", ""), "")),
+            text_cell(one.get("reason", "")),
+        )
+        for one in weighed
+    ]
+    note = (
+        "Gains: by how much the sum of squared residuals falls beyond what declared parameters explain, in variances of"
+        " the noise; held-out on recordings that no fit has seen."
+    )
+    return Table(title, columns, rows, note)
+
+
+def _values(parameters: Json) -> str:
+    """``gap = (2.50 ± 0.10)e-4 m, …``."""
+    texts = []
+    for name, value in parameters.items():
+        unit = "" if value.get("unit") in (None, "1") else f" {value['unit']}"
+        texts.append(f"{name} = {plus_minus(value['value'], value.get('stderr'))}{unit}")
+    return ", ".join(texts)
+
+
+def _ratios_figure(part: Part, rows: list[_Pair]) -> Figure:
+    drawn = Chart(f"{part.prefix}ratios", row_height=260)
+    labels = [f"{channel}, {role_text(role)}" for role, channel, *_ in rows]
+    before = [noise_ratio(error) for *_, error, _ in rows]
+    after = [noise_ratio(error) if error else None for *_, error in rows]
+    for name, colour, heights in (("before", BEFORE, before), ("after", AFTER, after)):
+        if any(height is not None for height in heights):
+            drawn.bars(labels, heights, name, colour=colour)
+    drawn.level(1.0)
+    drawn.axes(y="rmse / noise [1]", x="signal and recordings [–]", y_options={"rangemode": "tozero"})
+    return drawn.build(
+        "Errors as multiples of the sensor's noise; dotted: the noise, which no model gets below."
+    )
+
+
+def _experiment(content: Json | None) -> list[tuple[str, str]]:
+    """What to record next, as a fact."""
+    if not content:
+        return []
+    apart = number(content.get("distance"), 3)
+    now = number(content.get("present"), 3)
+    return [
+        (
+            "to tell them apart",
+            f"Record {content['name']} ({content.get('file', 'experiment.csv')}): it sets {listing(content['rivals'])}"
+            f" {apart} variances of the noise apart, these recordings {now}.",
+        )
+    ]

@@ -1,0 +1,1 @@
+"""An identification: ``result`` and ``files`` it leaves, ``tables`` it prints, a section of its page per file."""

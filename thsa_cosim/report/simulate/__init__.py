@@ -1,0 +1,1 @@
+"""A simulate study: ``files`` it leaves and ``tables`` it prints."""

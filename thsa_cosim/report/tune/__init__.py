@@ -1,0 +1,1 @@
+"""A tuning: ``result`` and ``files`` it leaves, ``tables`` it prints, a section of its page per file."""

@@ -231,7 +231,8 @@ class Plant:
             from thsa_cosim.fmu.exchange import integrate
 
             return integrate(instance, plan, self.progress, tolerance)
-        free = self.stepping == "free" and is_offered(instance)
+        exact = plan.mode in ("derivative", "intermediate")
+        free = self.stepping == "free" and exact and is_offered(instance)
         if free:
             tolerance = solver_tolerance(instance, tolerance)
         instance.initialize_begin(start, stop, tolerance)

@@ -22,7 +22,7 @@ for; free ones are as long as it allows, and the rig's sensors see 5e-6 of full 
 shipped scenarios err by is printed by ``benchmarks/fmu.py --free``."""
 
 
-class _Trajectory(ctypes.Structure):
+class Trajectory(ctypes.Structure):
     """``Trajectory`` of ``runtime/trajectory.h``."""
 
     _fields_: ClassVar = [
@@ -48,7 +48,7 @@ class Course:
             references[list(channel.columns)] = channel.references
         self._outputs, self._times = references, plan.grid.times
         stretches = self.segments
-        self.struct = _Trajectory(len(inputs), len(stretches), len(references), len(self._times))
+        self.struct = Trajectory(len(inputs), len(stretches), len(references), len(self._times))
         arrays = {
             "inputs": self._inputs,
             "starts": stretches.starts,

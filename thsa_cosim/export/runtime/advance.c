@@ -184,7 +184,7 @@ Status solver_advance(Instance *c, double end) {
     if (N_G && (instance_indicators(c) != OK || judge(c, c->g, &start)))
         return give_up(c, "event indicators cannot be computed");
 
-    while (now->time < end) {
+    while (now->time < end && !c->return_early) {
         const double remaining = end - now->time, grain = time_grain(c, end);
         int landing = 0, was_rejected = 0, last;
         double h, error, accepted = restarted ? CAREFUL : 1.0;

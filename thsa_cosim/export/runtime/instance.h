@@ -58,6 +58,7 @@ struct Instance {
     void (*emit)(Instance *, Status, const char *category, const char *message);
     void (*before_step)(Instance *, double time);  /* FMI 3 intermediate update: inputs wanted at `time` */
     void (*after_step)(Instance *);                /* FMI 3 intermediate update: an internal step is done */
+    int return_early;        /* after_step was told to end the communication step where it is */
     Recorder *recorder;      /* of the trajectory that is running (trajectory.c), else NULL */
 
     /* caches: valid for the present (time, x, u, p, m) */

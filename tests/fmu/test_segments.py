@@ -15,7 +15,11 @@ def variable(name: str) -> Variable:
 
 
 def cut(
-    time: FloatArray, columns: dict[str, FloatArray], held: set[str], times: FloatArray, merged: float = MERGED
+    time: FloatArray,
+    columns: dict[str, FloatArray],
+    held: set[str],
+    times: FloatArray,
+    merged: float = MERGED,
 ) -> Segments:
     linear = np.array([name not in held for name in columns])
     signals = Signals(time, columns, {}, frozenset(held))

@@ -86,10 +86,14 @@ def test_a_failure_is_a_discard_with_time_and_reason(pair: tuple[Plant, Plant]) 
     free, stepped = pair
     wild = Signals(TIME, {"w_cmd": np.where(TIME < 1.0, 0.0, 1e300), "T_amb": np.full_like(TIME, -30.0)})
     for plant in (free, stepped):
-        with pytest.raises(SimulationFailure, match=r"returned fmi\dDiscard at t = .* s: .* at time") as caught:
+        with pytest.raises(
+            SimulationFailure, match=r"returned fmi\dDiscard at t = .* s: .* at time"
+        ) as caught:
             plant.run({}, wild, OUTPUTS, TIME)
         assert caught.value.status is Status.FMI_DISCARD
-        assert np.isfinite(plant.run({}, command(held=True), OUTPUTS, TIME)["w_m"]).all()  # the plant lives on
+        assert np.isfinite(
+            plant.run({}, command(held=True), OUTPUTS, TIME)["w_m"]
+        ).all()  # the plant lives on
 
 
 def test_how_inputs_are_given_is_respected(pair: tuple[Plant, Plant]) -> None:

@@ -50,7 +50,14 @@ class Fmi3:
         )
 
         def ask(
-            _e: int, time: float, may_set: bool, may_get: bool, finished: bool, _may: bool, early: Any, _at: Any
+            _e: int,
+            time: float,
+            may_set: bool,
+            may_get: bool,
+            finished: bool,
+            _may: bool,
+            early: Any,
+            _at: Any,
         ) -> None:
             if update and update(self, time, may_set, may_get, finished):
                 early[0] = True

@@ -51,7 +51,12 @@ class Followed(NamedTuple):
     report: Trajectory
 
 
-def follow(fmu: Fmu, times: Array, outputs: Sequence[int], table: Table = NOTHING, wrong: dict[str, np.ndarray] | None = None
+def follow(
+    fmu: Fmu,
+    times: Array,
+    outputs: Sequence[int],
+    table: Table = NOTHING,
+    wrong: dict[str, np.ndarray] | None = None,
 ) -> Followed:
     """Call the function; ``wrong`` replaces fields of its struct."""
     inputs = [fmu.refs.u + k for k in range(table.values.shape[1])]
@@ -85,7 +90,9 @@ def test_kinks_between_output_times_are_exact(version: type[Fmu], count: int) ->
     times = np.linspace(0.0, 3.0, count)
     exact = linear_exact(times, piecewise, KNOTS)
     with version("linear") as fmu:
-        found = follow(fmu.start(tolerance=1e-9), times, [fmu.refs.x + k for k in range(3)], broken_line(KNOTS, COURSE))
+        found = follow(
+            fmu.start(tolerance=1e-9), times, [fmu.refs.x + k for k in range(3)], broken_line(KNOTS, COURSE)
+        )
     assert found.status == OK
     assert np.all(np.abs(found.rows - exact).max(axis=0) < 1e-8 * np.abs(exact).max(axis=0))
 
@@ -102,7 +109,7 @@ def test_steps_cross_samples() -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7, 1e-9])
 def test_every_sample_is_as_exact_as_the_tolerance_asks(tolerance: float) -> None:
-    """Dense output errs no more than the ends of the steps: an undamped oscillation, a few samples per step and many."""
+    """Dense output errs no more than the ends of the steps do: an undamped oscillation."""
     times = np.linspace(0.0, 3.0, 1001)
     with Fmi2("oscillator") as fmu:
         found = follow(fmu.start(tolerance=tolerance), times, [fmu.refs.x])
@@ -111,7 +118,10 @@ def test_every_sample_is_as_exact_as_the_tolerance_asks(tolerance: float) -> Non
 
 def test_held_inputs_jump_and_equal_values_are_no_jump() -> None:
     """x' = -a x + u0 with u0 held: exponentials, restarted at every jump."""
-    knots, course = np.array([0.0, 0.4, 0.7, 1.1]), np.array([[1.0, 0.0], [-2.0, 0.0], [-2.0, 0.0], [0.5, 0.0]])
+    knots, course = (
+        np.array([0.0, 0.4, 0.7, 1.1]),
+        np.array([[1.0, 0.0], [-2.0, 0.0], [-2.0, 0.0], [0.5, 0.0]]),
+    )
     times = np.linspace(0.0, 2.0, 41)
     exact, x, begin = [], 1.0, 0.0
     for time in times:
@@ -141,7 +151,9 @@ def test_feed_through_of_a_static_model_is_exact_at_every_sample(version: type[F
         np.testing.assert_allclose(found.rows, np.column_stack([v, force, force * v]), rtol=1e-9, atol=1e-15)
 
 
-@pytest.mark.parametrize(("count", "tolerance", "bound"), [(4, 1e-6, 1e-5), (301, 1e-6, 1e-5), (301, 1e-8, 1e-6)])
+@pytest.mark.parametrize(
+    ("count", "tolerance", "bound"), [(4, 1e-6, 1e-5), (301, 1e-6, 1e-5), (301, 1e-8, 1e-6)]
+)
 def test_stick_slip_on_coarse_and_fine_grids(count: int, tolerance: float, bound: float) -> None:
     times = np.linspace(0.0, 3.0, count)
     reference = block(times, lambda _t: 0.05)
@@ -181,7 +193,9 @@ def test_saturation_under_kinks_and_jumps(jumps: bool) -> None:
 
         stop = knots[j + 1] if j + 1 < len(knots) else 2.0
         inside = times[(times > start + 1e-12) & (times < stop - 1e-12)]
-        solved = solve_ivp(rhs, (start, stop), x, "Radau", [*inside, stop], rtol=1e-9, atol=1e-11, max_step=1e-3)
+        solved = solve_ivp(
+            rhs, (start, stop), x, "Radau", [*inside, stop], rtol=1e-9, atol=1e-11, max_step=1e-3
+        )
         reference.extend(solved.y.T)
         x = solved.y[:, -1]
     with Fmi2("saturation", logging=True) as fmu:
@@ -206,7 +220,9 @@ def test_excursions_are_found_between_and_at_samples(excess: float, count: int) 
 
 def test_one_time_gives_the_initial_values(version: type[Fmu]) -> None:
     with version("linear") as fmu:
-        found = follow(fmu.start(start=2.0), np.array([2.0]), [0, fmu.refs.x], NOTHING._replace(starts=np.array([2.0])))
+        found = follow(
+            fmu.start(start=2.0), np.array([2.0]), [0, fmu.refs.x], NOTHING._replace(starts=np.array([2.0]))
+        )
     assert found.status == OK
     np.testing.assert_array_equal(found.rows, [[2.0, 1.0]])
 
@@ -353,4 +369,3 @@ def test_fmi3_returns_early_where_it_is_asked_to() -> None:
     assert x == pytest.approx(np.exp(-1.0), rel=1e-5)
     with Fmi3("linear", update=lambda *_: True, required=[1]) as fmu:  # not allowed at instantiation
         assert fmu.start().do_step(0.0, 2.0) == (False, 2.0)
-

@@ -1,10 +1,11 @@
 """Model Exchange: our own integration of an FMU's right-hand side, with all of its events.
 
 Inputs are applied as u(t) at every call of the right-hand side, so results do not depend on the output
-times. Integration stops at every kink of a linear input (no pulse is stepped over; see ``segments``) and restarts,
-through Event Mode, wherever an input jumps; outputs between come from CVODE's interpolation of the states. State events are located by CVODE's root finding, and the signs of the
-event indicators are compared after every step as well (an indicator that returns from exactly zero has no
-root); time and step events follow FMI 2.0.4 clause 3.2 and FMI 3.0.2 clause 3.2.
+times: outputs between the solver's steps come from its interpolation of the states. Integration stops at every
+kink of a linear input (no pulse is stepped over; see ``segments``) and restarts, through Event Mode, wherever an
+input jumps. State events are located by CVODE's root finding, and the signs of the event indicators are compared
+after every step as well (an indicator that returns from exactly zero has no root); time and step events follow
+FMI 2.0.4 clause 3.2 and FMI 3.0.2 clause 3.2.
 """
 
 from collections.abc import Iterator

@@ -24,7 +24,7 @@ _MOST_TURNS = 64
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """m stretches: from ``starts[j]`` (m,) s on, u(t) = ``values[j]`` + ``slopes[j]`` (t - starts[j]), both (m, inputs).
+    """m stretches: from ``starts[j]`` (m,) s on, u(t) = ``values[j]`` + ``slopes[j]`` (t - starts[j]), (m, inputs).
 
     ``jumps`` (m,): whether some input jumps where the stretch starts. ``stop`` ends the last one; a stretch that starts
     there has no length and says what inputs jump to at the very end.

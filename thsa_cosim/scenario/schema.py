@@ -12,7 +12,7 @@ from thsa_cosim.errors import did_you_mean
 from thsa_cosim.laws import FORMS
 from thsa_cosim.scenario.recording_schema import RecordingsTable, TemperatureTable
 from thsa_cosim.scenario.system_schema import ModelTable
-from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order
+from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order, check_pairs
 from thsa_cosim.search.strategies import SearchMethod, Strategy
 
 
@@ -150,10 +150,7 @@ class CostTable(Table):
     @field_validator("mask")
     @classmethod
     def _mask(cls, mask: list[list[float]]) -> list[list[float]]:
-        for pair in mask:
-            if len(pair) != 2 or not pair[0] < pair[1]:
-                raise PydanticCustomError("mask", "must hold pairs [from, to] in s with from below to")
-        return mask
+        return check_pairs(mask)
 
 
 class EvolutionTable(Table):

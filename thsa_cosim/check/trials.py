@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined, tr
 from thsa_cosim.check import numerics
 from thsa_cosim.check.finding import Finding, Verdict
 from thsa_cosim.fmu import FmuDescription, probe
-from thsa_cosim.fmu.plant import Kind, Reuse
+from thsa_cosim.fmu.inputs import input_modes, is_ours
+from thsa_cosim.fmu.plant import Backend, Kind, Reuse
 from thsa_cosim.signals import FloatArray, Signals
 
 _WARM_UP = 10
@@ -21,6 +23,8 @@ _SHORT = 200
 """Communication points of a run that is repeated to watch memory."""
 _ONE_BY_ONE = 60
 """Parameters, and inputs, that are tried one by one at most."""
+_MANY_STEPS = 20_000
+_LONG = 3000
 _LARGER = (10.0, 100.0)
 
 
@@ -37,6 +41,8 @@ class Excitation:
     """Value that an input runs to, by name, where ``inputs`` does not say it."""
     duration: float | None = None
     step: float | None = None
+    parameters: tuple[str, ...] = ()
+    """Parameters that have to change something; default: all that can."""
     tolerance: float | None = None
     kind: Kind | None = None
     input_mode: str | None = None
@@ -109,7 +115,11 @@ class Trials:
         )
 
     def _runner(
-        self, reuse: Reuse = "fresh", kind: Kind | None = None, more: Sequence[Experiment] = ()
+        self,
+        reuse: Reuse = "fresh",
+        kind: Kind | None = None,
+        more: Sequence[Experiment] = (),
+        backend: Backend | Literal["auto"] | None = "auto",
     ) -> LocalRunner:
         """Open one worker process with "trial", "halved" and "doubled" (step), "short" (footprint) and ``more``."""
         experiments = [
@@ -127,7 +137,8 @@ class Trials:
             deadline_s=self._deadline,
             reuse=reuse,
             kind=kind or self._kind,
-            backend="python",  # the same bits as machine code, and each process starts a second earlier
+            # The same bits, and a process starts a second earlier than with machine code.
+            backend=("python" if len(self._time) < _LONG else None) if backend == "auto" else backend,
             recycle_growth_mb=1e6,
         )
 
@@ -167,7 +178,8 @@ class Trials:
             self._inputs = self._excited()
             outcome = self._try()
             if outcome.ok:
-                doubt = f"; only {np.ptp(self._time):g} s of {np.ptp(whole):g} s, as it fails in longer steps ({reason})"
+                done = f"{np.ptp(self._time):g} s of {np.ptp(whole):g} s"
+                doubt = f"; only {done}, as it fails in longer steps ({reason})"
         if not outcome.ok and self._given.kind is None and self._kind == "co-simulation":
             outcome, doubt = self._fall_back(outcome)
         if not outcome.ok or outcome.signals is None:
@@ -196,13 +208,19 @@ class Trials:
         return "inputs ramping away from their start values, with kinks"
 
     def _try(self) -> Outcome:
-        """Find out how inputs are to be given, then run once."""
-        if self._kind == "co-simulation" and self._given.input_mode is None:
-            self._handling = try_input_handling(
-                self._experiment("handling", self._time), deadline_s=self._deadline
-            )
-            best = self._handling.best
-            self._mode = None if best is None else best.mode
+        """Run once; find out how inputs are to be given, and run so."""
+        outcome = self._run_once()
+        told = self._given.input_mode is not None or is_ours(self._description)
+        if told or not outcome.ok or self._kind != "co-simulation":
+            return outcome
+        self._handling = try_input_handling(
+            self._experiment("handling", self._time), deadline_s=self._deadline
+        )
+        best = self._handling.best
+        self._mode = None if best is None else best.mode
+        return self._run_once()
+
+    def _run_once(self) -> Outcome:
         with self._runner() as runner:
             return runner.run([Job("trial")])[0]
 
@@ -229,7 +247,12 @@ class Trials:
         if self._inputs is None:
             self._note("inputs", Verdict.OK, "it has none that run linearly")
             return
-        if self._kind == "model-exchange" or self._handling is not None:
+        if is_ours(self._description):
+            mode = input_modes(self._description, probe.excitable(self._description))[-1]
+            self._note(
+                "inputs", Verdict.OK, f"linear within a step, exactly ({mode}; an FMU of this toolkit)"
+            )
+        elif self._kind == "model-exchange" or self._handling is not None:
             trial = self._handling or HandlingTrial("", (), True)
             self._take("inputs", numerics.judge_handling(trial, self._kind))
         names = [v.name for v in probe.excitable(self._description)][:_ONE_BY_ONE]
@@ -249,11 +272,15 @@ class Trials:
     def start_value_line(self) -> None:
         """Change one start value after the other: each must change something, compared with a fresh instance."""
         name = "start values"
-        tried = dict(list(self._changed.items())[:_ONE_BY_ONE])
+        changed = probe.changed_parameters(self._description, zeros=True)
+        named = self._given.parameters or tuple(n for n in changed if n not in self._values)
+        tried = {n: changed[n] for n in named[:_ONE_BY_ONE] if n in changed}
         if not tried:
             self._note(name, Verdict.NOT_TRIED, "it has no parameter to change")
             return
-        with self._runner() as runner:
+        # Machine code takes a second to load, and pays where there are many steps.
+        many = len(tried) * len(self._time) > _MANY_STEPS
+        with self._runner(backend=None if many else "python") as runner:
             outcomes = runner.run([Job("trial", {n: v}) for n, v in tried.items()])
         found = dict(zip(tried, outcomes, strict=True))
         self._take(name, numerics.judge_changes(self._first, found, "start values"))
@@ -295,7 +322,7 @@ class Trials:
         step = float(self._time[1] - self._time[0])
         judged = numerics.judge_step(self._first, halved, step)
         self._take(name, judged)
-        if len(self._time) > 2:
+        if len(self._time) > 2 and self._given.inputs is None:  # else the step is the user's
             change = judged[2].get("change", 0.0)
             self._take("longer step", numerics.judge_longer_step(self._first, doubled, step, change))
 
@@ -304,6 +331,8 @@ class Trials:
         unknown = [v for v in probe.excitable(self._description) if probe.is_undeclared(v)]
         unknown = [v for v in unknown if v.name not in self._given.ends]
         if self._given.inputs is not None or not unknown or self._kind != "co-simulation":
+            return
+        if is_ours(self._description):  # it controls its own step
             return
         larger = {times: self._excited(times=times) for times in _LARGER}
         grids = {"h": self._time, "h/2": refined(self._time, 2)}

@@ -228,11 +228,14 @@ def _amplitude(variable: Variable) -> float:
     return size
 
 
-def changed_parameters(description: FmuDescription) -> dict[str, float]:
-    """Return start values 1 % off (or a little off 0) for floating-point parameters, within their bounds."""
+def changed_parameters(description: FmuDescription, *, zeros: bool = False) -> dict[str, float]:
+    """Return start values 1 % off for floating-point parameters, within their bounds.
+
+    Those that are 0 are left out, or with ``zeros`` come out a little off 0.
+    """
     changed = {}
     for v in description.parameters:
-        if not v.is_float or v.is_array or v.start is None:
+        if not v.is_float or v.is_array or v.start is None or not (v.start or zeros):
             continue
         size = 0.01 * v.start or 1e-3 * (v.nominal or 1.0)
         for value in (v.start + size, v.start - size):

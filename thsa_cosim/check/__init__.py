@@ -11,8 +11,9 @@ from pathlib import Path
 from thsa_cosim.check.finding import CheckReport, Finding, Verdict
 from thsa_cosim.check.trials import Excitation, Trials
 from thsa_cosim.errors import ParameterError
-from thsa_cosim.fmu import FmuDescription, probe, read_description
+from thsa_cosim.fmu import FmuDescription, probe
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.system import read_description
 
 __all__ = ["CheckReport", "Excitation", "Finding", "Verdict", "check_fmu"]
 

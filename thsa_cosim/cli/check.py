@@ -116,12 +116,17 @@ def _scenario(path: Path, deadline: float) -> Checked:
     from thsa_cosim.inspection import Inspection
     from thsa_cosim.report.check import print_check
     from thsa_cosim.report.inspection import print_inspection
-    from thsa_cosim.scenario import load_tune
+    from thsa_cosim.scenario import Scenario, StagedScenario, load_tune
     from thsa_cosim.scenario.load import read_toml
     from thsa_cosim.scenario.stages import load_study
 
     loaded = load_tune(path) if read_toml(path).get("kind") == "tune" else load_study(path)
-    data = Inspection()
+    scenarios = (
+        [stage.scenario for stage in loaded.stages] if isinstance(loaded, StagedScenario) else [loaded]
+    )
+    of_recordings = [s.data for s in scenarios if isinstance(s, Scenario)]
+    findings = tuple(f for data in of_recordings for f in data.findings)
+    data = Inspection.of(findings, tuple(s for data in of_recordings for s in data.repairs))
     report = _fmu_of(loaded, deadline)
     verdict = max(
         {"good": "ok", "usable": "warning", "bad": "failed"}[data.verdict], str(report.verdict), key=_WORSE
@@ -137,7 +142,7 @@ def _scenario(path: Path, deadline: float) -> Checked:
 
     def show(out: "Console") -> None:
         out.print(f"{path}: a scenario of kind {loaded.kind!r} that loads", highlight=False, markup=False)
-        print_inspection(out, data)
+        print_inspection(out, data, remedies=True)
         print_check(out, report)
         out.print(f"verdict: {verdict}", highlight=False)
 

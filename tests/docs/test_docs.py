@@ -59,7 +59,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(("body", "sentence"), REFUSED, ids=[sentence[:40] for _, sentence in REFUSED])
 def test_refusals_are_as_the_export_page_says(tmp_path: Path, body: str, sentence: str) -> None:
-    for needed in ("rumoca", "casadi"):
+    for needed in ("casadi",):
         pytest.importorskip(needed, reason="the export tools are not installed")
     from thsa_cosim.errors import ModelicaError
     from thsa_cosim.export.causal import make_causal

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 ca = pytest.importorskip("casadi", reason="the export extra is not installed")
-pytest.importorskip("rumoca", reason="the export extra is not installed")
 pytest.importorskip("ziglang", reason="the export extra is not installed")
 
 from thsa_cosim.export.archive import make_sources

@@ -15,7 +15,6 @@ from scipy.integrate import solve_ivp
 from scipy.signal import StateSpace, lsim
 
 pytest.importorskip("casadi", reason="the export extra is not installed")
-pytest.importorskip("rumoca", reason="the export extra is not installed")
 pytest.importorskip("ziglang", reason="the export extra is not installed")
 
 from thsa_cosim.errors import ThsaCosimError

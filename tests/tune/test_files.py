@@ -85,7 +85,6 @@ def test_the_c_header_interpolates_like_the_schedule(tmp_path: Path, schedule: G
 def test_the_modelica_block_becomes_an_fmu_that_interpolates_alike(
     tmp_path: Path, schedule: GainSchedule
 ) -> None:
-    pytest.importorskip("rumoca")
     from thsa_cosim.export import export_fmu
     from thsa_cosim.fmu import Plant
     from thsa_cosim.signals import Signals

@@ -24,8 +24,9 @@ from thsa_cosim.batch.local import LocalRunner
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.runner import OnOutcome, check_experiment, check_jobs, wrapper_names
 from thsa_cosim.errors import FmuError, MachineError, MissingExtraError, StudyError
-from thsa_cosim.fmu.description import FmuDescription, read_description
+from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.scratch import ScratchFolder
+from thsa_cosim.system import read_description
 
 _CONNECT_S = 20.0
 _ATTEMPTS = 3
@@ -78,6 +79,7 @@ class ClusterRunner:
             distributed: Any = importlib.import_module("distributed")
         except ImportError:
             raise MissingExtraError("Running on a cluster", "cluster") from None
+        self.notes: Sequence[str] = ()
         self._distributed = distributed
         self._descriptions, self._failures = _describe(experiments)
         self._wrapped = wrapper_names(experiments)

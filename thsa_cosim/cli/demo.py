@@ -16,7 +16,7 @@ from thsa_cosim.shipped import copy_example
 
 _EXAMPLES = ("motor", "table4", "driven")
 _NEEDED = (*(f"scenarios/{name}.toml" for name in _EXAMPLES), "modelica/THSA")
-_EXPORTER = ("rumoca", "casadi", "ziglang")
+_EXPORTER = ("casadi", "ziglang")
 #: Temperatures of the motor bench that are identified: a double exponential needs four.
 _SOME, _FEW = ("m55", "m40", "m20", "p00", "p25"), ("m55", "m30", "p00", "p25")
 

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from thsa_cosim.scenario import Scenario
 
 
+#: Exit code of a study that has no usable result.
+NOT_TESTED = 3
+
+
 @click.command()
 @study_options
 @click.option("--package", type=PATH, default=None, help="Folder of the model's Modelica package.")
@@ -29,6 +33,7 @@ def diagnose(options: StudyOptions, package: Path | None) -> None:
     loaded = load_scenario(options.scenario, **options.overrides)
     options.check_kind(loaded.kind, "diagnose")
     loaded = _with_package(loaded, package)
+    options.show_data(loaded)
     place = options.place()
     folder = place["folder"]
     if not _is_complete(loaded, folder):
@@ -41,6 +46,8 @@ def diagnose(options: StudyOptions, package: Path | None) -> None:
     files = sum(path.is_file() for path in folder.rglob("*"))
     content = _read(folder / RESULT)
     options.conclude(folder / RESULT, files, lambda out: print_diagnosis(out, content))
+    if content["verdict"] == "not-tested":
+        raise click.exceptions.Exit(NOT_TESTED)
 
 
 def _with_package(scenario: "Scenario", package: Path | None) -> "Scenario":

@@ -1,6 +1,6 @@
 """The use case: scenario → superset → attribution → closure → verdict."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,8 +16,9 @@ from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, values_of
+from thsa_cosim.diagnosis.choosing.orders import Machine, machine_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
-from thsa_cosim.diagnosis.choosing.verdict import verdict_on
+from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.explaining.balance import close_balances
 from thsa_cosim.diagnosis.explaining.dependence import dependence
@@ -27,11 +28,12 @@ from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified, identify_model
-from thsa_cosim.diagnosis.fitting.structure import errors
+from thsa_cosim.diagnosis.fitting.structure import errors, errors_by_recording
 from thsa_cosim.diagnosis.fitting.trials import Trial, spec_of, trials_of, with_fmu, with_wrapper
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import ChannelError, Comparison, DiagnosisResult, EmpiricalLaw
 from thsa_cosim.errors import StudyError
+from thsa_cosim.export.compile import this_platform
 from thsa_cosim.identify import Comparison as Compared
 from thsa_cosim.identify import ForceBalance, force_balance
 from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
@@ -91,8 +93,10 @@ def diagnose(
     )
     with open_runner(scenario.simulation, [t.experiment for t in driven], workers, cluster) as runner:
         bench = Bench(runner, driven)
-        scan = wave_number_finder(bench, tested.slots, tested.signals_at)
         start = before.fit.vector
+        at_start = {t.case.name: unknowns.assignments(start, t.group) for t in driven if t.part == "fit"}
+        machine = machine_of(tested.slots, tested.signals_at(at_start))
+        scan = wave_number_finder(bench, tested.slots, tested.signals_at, machine)
         found = attribute(
             bench, unknowns, tested.candidates, scan, start=start, seed=scenario.seed, most=spec.most, say=say
         )
@@ -100,7 +104,20 @@ def diagnose(
         reason = next(iter(bench.failures), "no run succeeded")
         raise StudyError(f"{scenario.path}: the model with all effects cannot be simulated: {reason}")
     return _Closing(
-        scenario, spec, folder, workers, cluster, trials, unknowns, before, found, bench, say, box
+        scenario,
+        spec,
+        folder,
+        workers,
+        cluster,
+        trials,
+        unknowns,
+        before,
+        found,
+        bench,
+        say,
+        tuple(effects),
+        machine,
+        box,
     ).result()
 
 
@@ -119,17 +136,21 @@ class _Closing:
     found: Attribution
     bench: Bench
     say: Say
+    effects: tuple[str, ...]
+    machine: Machine
     box: BlackBox | None = None
 
     def result(self) -> DiagnosisResult:
         """Identify the extended model on its own FMU as the declared one was, and judge both."""
         scenario, found, before = self.scenario, self.found, self._declared()
-        accepted, notes, after = found.accepted, list(found.notes), before
+        accepted, notes, after = found.accepted, [*self.bench.notes, *found.notes], before
         model: Path | None = None
         extended: Path | None = None
         wrapper: Path | None = None
         if self.box is not None:
             notes += self.box.notes
+        if not _tested(found):
+            notes.append(_untested(found, self.effects))
         if accepted:
             wider = extended_unknowns(self.unknowns, accepted)
             hint = found.final.at(wider.names)
@@ -145,7 +166,8 @@ class _Closing:
                 values = {**after.trials[0].case.fixed, **after.fit.unknowns.named(after.fit.vector)}
                 wrapper = write_wrapper(self.folder, scenario.fmu.path, self.box.wrapper, values)
         held_out = tuple(t for t in self.trials if t.part == "validate")
-        share, verdict = verdict_on(held_out, before.validate, after.validate, bool(accepted))
+        share = left_over(held_out, before.validate, after.validate)
+        verdict = verdict_on(errors(held_out, after.validate), len(accepted), _tested(found))
         law: EmpiricalLaw | None = None
         if verdict == "unexplained-structure" and self.box is None:
             self.say("looking for an empirical law")
@@ -158,12 +180,16 @@ class _Closing:
             if terms is not None and self.spec.empirical:
                 # The share stays that of the effects: a law describes and explains nothing.
                 model, extended, after = self._with_law(terms)
+        if model is not None and extended is not None and (here := this_platform()):
+            notes.append(
+                f"{extended.name} is for {here[0]} only; thsa-cosim export {model} --package {self.spec.package}"
+                f" -o {extended} compiles it for all platforms"
+            )
         counts = dict(self.bench.failures)
         changed = after is not before
         for identified in (before, after) if changed else (before,):
             for reason, count in identified.failures.items():
                 counts[reason] = counts.get(reason, 0) + count
-        inflation = max(1.0, after.fit.misfit / after.fit.residual.size)
         return DiagnosisResult(
             title=scenario.title or scenario.path.stem,
             status="complete",
@@ -173,11 +199,13 @@ class _Closing:
             fmu=scenario.fmu.path,
             fmu_sha256=scenario.fmu.sha256,
             verdict=verdict,
-            effects=found_effects(found, after.fit, inflation),
+            effects=found_effects(found, after.fit, self.machine),
             before=_errors(before),
             after=_errors(after) if changed else {"fit": {}, "validate": {}},
+            recordings_before=_errors_by_recording(before),
+            recordings_after=_errors_by_recording(after) if changed else {},
             declared_before=values_of(before.fit, declared=True),
-            declared_after=values_of(after.fit, declared=True, inflation=inflation),
+            declared_after=values_of(after.fit, declared=True),
             unexplained=share,
             model=model,
             extended_fmu=extended,
@@ -197,6 +225,7 @@ class _Closing:
             evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if changed else 0),
             failures=counts,
             notes=tuple(notes),
+            data=self.scenario.data,
         )
 
     def _declared(self) -> Identified:
@@ -243,6 +272,28 @@ def _errors(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
         part: errors(tuple(t for t in identified.trials if t.part == part), residual)
         for part, residual in parts.items()
     }
+
+
+def _errors_by_recording(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
+    found: dict[str, Mapping[str, ChannelError]] = {}
+    for part, residual in (("fit", identified.fit.residual), ("validate", identified.validate)):
+        trials = tuple(t for t in identified.trials if t.part == part)
+        for name, channels in errors_by_recording(trials, residual).items():
+            found[f"{part}/{name}" if name in found else name] = channels
+    return found
+
+
+def _tested(found: Attribution) -> int:
+    """How many proposals the recordings could have told from nothing."""
+    return sum(p.is_testable for r in found.rounds[:1] for p in r.proposals)
+
+
+def _untested(found: Attribution, effects: Iterable[str]) -> str:
+    """Why no effect could be tried."""
+    names = ", ".join(effects)
+    if not any(r.proposals for r in found.rounds):
+        return f"no effect could be tried: the model has no place for {names}"
+    return f"no effect could be tried: nothing in the fit recordings depends on {names}"
 
 
 def _comparisons(before: Identified, after: Identified | None) -> tuple[Comparison, ...]:

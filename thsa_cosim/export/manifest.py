@@ -20,7 +20,7 @@ from thsa_cosim.export.archive import make_sources, write_fmu
 from thsa_cosim.export.causal import make_causal
 from thsa_cosim.export.flatten import flatten
 
-TOOLS = ("casadi", "rumoca", "ziglang")
+TOOLS = ("casadi", "ziglang")
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,13 @@ from thsa_cosim.fmu.native import MessageSink
 from thsa_cosim.fmu.plan import Plan
 from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.fmu.stepping import check_names, step_through
+from thsa_cosim.fmu.trajectory import follow, is_offered, solver_tolerance
 from thsa_cosim.signals import FloatArray, Signals
 
 Kind = Literal["co-simulation", "model-exchange"]
 Backend = Literal["compiled", "python"]
 Reuse = Literal["fresh", "reset"]
+Stepping = Literal["free", "samples"]
 
 _PLANS = 64
 _log = logging.getLogger(__name__)
@@ -45,6 +47,7 @@ class Plant:
         kind: Kind | None = None,
         backend: Backend | None = None,
         reuse: Reuse = "fresh",
+        stepping: Stepping = "free",
         scratch: ScratchFolder | None = None,
         progress: FloatArray | None = None,
         on_message: MessageSink | None = None,
@@ -72,12 +75,15 @@ class Plant:
             )
         self.backend: Backend = backend or _default_backend()
         self.reuse: Reuse = reuse
+        self.stepping: Stepping = stepping
         self.progress = np.zeros(4) if progress is None else progress
         self._scratch = scratch
         self._on_message = on_message
         self._instance: Instance | None = None
         self._plans: dict[Any, tuple[Any, Any]] = {}
         self._update: IntermediateUpdate | None = None
+        self.input_mode: str | None = None
+        """How linear inputs are given in Co-Simulation, one of ``inputs.MODES``; None: as trusted."""
 
     @classmethod
     def open(
@@ -87,6 +93,7 @@ class Plant:
         kind: Kind | None = None,
         backend: Backend | None = None,
         reuse: Reuse = "fresh",
+        stepping: Stepping = "free",
         on_message: MessageSink | None = None,
     ) -> "Plant":
         """Read and unpack the FMU ``path`` into a temporary folder, which ``close`` removes.
@@ -100,6 +107,10 @@ class Plant:
         reuse
             "fresh": a new instance per run. "reset": one instance, fmiXReset between runs; only for FMUs
             whose reset is known to be right (``thsa-cosim check``).
+        stepping
+            "free": an FMU that offers it is given the whole run in one call, and its solver steps across
+            samples (``thsa_cosim.fmu.trajectory``). "samples": it communicates at every output time, as
+            other FMUs always do.
         on_message
             Called with each line that the FMU logs.
 
@@ -119,6 +130,7 @@ class Plant:
                 kind=kind,
                 backend=backend,
                 reuse=reuse,
+                stepping=stepping,
                 scratch=scratch,
                 on_message=on_message,
             )
@@ -170,7 +182,8 @@ class Plant:
         if self.description.fmi_version == "1.0":
             from thsa_cosim.fmu.fmi1 import run_fmi1
 
-            return run_fmi1(self.folder, self.description, values, inputs, outputs, time, self.progress)
+            mode = self.input_mode or "mean"
+            return run_fmi1(self.folder, self.description, values, inputs, outputs, time, self.progress, mode)
         try:
             result = self._run(values, inputs, outputs, time, tolerance, once)
         except BaseException:
@@ -195,6 +208,7 @@ class Plant:
             self.progress[0] = Phase.LOAD
             instance = self._new_instance()
             self._instance = instance
+        instance.input_mode = self.input_mode if self.kind == "co-simulation" else "mean"
         fresh = Plan(instance, inputs, outputs, time) if once else None
         plan = fresh or self._plan(instance, inputs, outputs, time)
         names = tuple(values)
@@ -211,16 +225,23 @@ class Plant:
             if self._update is not None:
                 self._update.block[1] = instance.handle
         self.progress[0] = Phase.INITIALIZE
-        instance.set_values(settable, np.fromiter((float(values[n]) for n in names), float, len(names)))
+        instance.set_start(settable, np.fromiter((float(values[n]) for n in names), float, len(names)))
         start, stop = float(plan.grid.times[0]), plan.grid.stop
         if self.kind == "model-exchange":
             from thsa_cosim.fmu.exchange import integrate
 
             return integrate(instance, plan, self.progress, tolerance)
+        exact = plan.mode in ("derivative", "intermediate")
+        free = self.stepping == "free" and exact and is_offered(instance)
+        if free:
+            tolerance = solver_tolerance(instance, tolerance)
         instance.initialize_begin(start, stop, tolerance)
         instance.set_values(plan.input_channels, plan.first)
         instance.initialize_end()
-        signals = step_through(instance, plan, self.progress, self.backend == "compiled")
+        if free and tolerance is not None:
+            signals = follow(instance, plan, self.progress, tolerance)
+        else:
+            signals = step_through(instance, plan, self.progress, self.backend == "compiled")
         self.progress[0] = Phase.TERMINATE
         instance.terminate()
         return signals
@@ -237,7 +258,7 @@ class Plant:
         self, instance: Instance, inputs: Signals | None, outputs: Sequence[str], time: FloatArray
     ) -> Plan:
         """Return the prepared experiment; recognised by identity, so pass the same objects again."""
-        key = ("plan", id(inputs), id(time), tuple(outputs))
+        key = ("plan", id(inputs), id(time), tuple(outputs), instance.input_mode)
         plan: Plan = self._cached(key, lambda: Plan(instance, inputs, outputs, time), keep=(inputs, time))
         return plan
 

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from thsa_cosim.inspection import Inspection, Trust
 from thsa_cosim.laws import Law
-from thsa_cosim.search import Generation
+from thsa_cosim.search import Generation, LocalSearch
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.ssv import ParameterSet
 
@@ -82,7 +83,8 @@ class PointResult:
 
     ``cost``: equation 6 at the estimate, ``also`` the same with other error functions; ``cost_per_sample`` is 1
     when only the stated noise is left. ``correlation`` (n, n) follows the order of ``parameters``. ``converged``
-    and ``stopped`` tell how the evolution ended, ``polished`` how the least-squares polish did (empty: none).
+    and ``stopped`` tell how the search ended, ``polished`` how the least-squares polish did (empty: none).
+    ``local``: the local searches, if any; ``generations``: those of the evolution, if it ran.
     """
 
     label: str
@@ -100,6 +102,7 @@ class PointResult:
     converged: bool
     stopped: str
     polished: str
+    local: tuple[LocalSearch, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -143,6 +146,10 @@ class IdentifyResult:
     notes: tuple[str, ...] = ()
     settings: Mapping[str, object] = field(default_factory=dict)
     force: ForceBalance | None = None
+    data: Inspection = field(default_factory=Inspection)
+    """What is to be known about the recordings."""
+    trust: Trust = field(default_factory=lambda: Trust("explained"))
+    """Whether the fit leaves nothing but noise."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """The use case: scenario → searches over a runner → parameters per point → laws → result."""
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
@@ -8,7 +9,7 @@ from pathlib import Path
 from thsa_cosim import __version__
 from thsa_cosim.batch import Experiment, Job, Journal, Runner
 from thsa_cosim.errors import InputError, StudyError
-from thsa_cosim.identify.compare import compare, summarise
+from thsa_cosim.identify.compare import case_residuals, compare, summarise
 from thsa_cosim.identify.evaluate import Evaluator, Reply, Request, residual_experiment, terms_experiment
 from thsa_cosim.identify.force import force_balance
 from thsa_cosim.identify.interleave import interleave
@@ -24,6 +25,8 @@ from thsa_cosim.identify.results import (
     PointResult,
     Progress,
 )
+from thsa_cosim.identify.silent import note_on, silent_parameters
+from thsa_cosim.inspection import Residual, judge
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario, open_runner
 from thsa_cosim.search import EvolutionSettings, Generation
@@ -71,12 +74,17 @@ def identify(
         try:
             experiments = _experiments(points, held_out)
             with open_runner(scenario.simulation, experiments, workers, cluster) as runner:
+                study.note(runner.notes)
                 evaluator = Evaluator(runner, journal, points, names, channels, on_progress)
+                study.try_parameters(evaluator)
                 study.search(evaluator)
                 study.validate(runner)
         except KeyboardInterrupt:
             study.interrupted = True
     return study.result()
+
+
+_log = logging.getLogger(__name__)
 
 
 class _Study:
@@ -97,6 +105,19 @@ class _Study:
         self._notes: list[str] = []
         self._evaluator: Evaluator | None = None
 
+    def note(self, notes: Sequence[str]) -> None:
+        """Take sentences for the result."""
+        self._notes += notes
+
+    def try_parameters(self, evaluator: Evaluator) -> None:
+        """Name the parameters that do nothing, before any search."""
+        silent = silent_parameters(self._points[0], lambda request: evaluator.serve([(0, request)])[0])
+        if silent:
+            sentences = note_on(silent)
+            self.note(sentences)
+            for sentence in sentences:
+                _log.warning(sentence)
+
     def search(self, evaluator: Evaluator) -> None:
         """Search all points at once; what is finished is kept whatever happens to the rest."""
         self._evaluator = evaluator
@@ -116,7 +137,13 @@ class _Study:
             def on_generation(generation: Generation) -> None:
                 evaluator.note_generation(index, generation.index)
 
-            return lambda ask: search_point(self._points[index], settings, spec.polish, ask, on_generation)
+            def on_evolution() -> None:
+                evaluator.expect_evolution(index, spec)
+
+            point = self._points[index]
+            return lambda ask: search_point(
+                point, spec.method, settings, spec.polish, ask, on_generation, on_evolution
+            )
 
         tasks = [task(index) for index in range(len(self._points))]
         with closing(interleave(tasks, evaluator.serve)) as finished:
@@ -183,7 +210,17 @@ class _Study:
             notes=(*scenario.notes, *failed, *notes, *left_out, *self._notes, *unsaid),
             settings={**asdict(scenario.search), "error": scenario.cost.error},
             force=force,
+            data=scenario.data,
+            trust=judge(self._residuals()),
         )
+
+    def _residuals(self) -> list[Residual]:
+        """What the fit leaves of every fitted signal, where it counts."""
+        found = []
+        for k, search in sorted(self._found.items()):
+            for case, simulated in zip(self._points[k].cases, search.signals, strict=False):
+                found += case_residuals(case, simulated)
+        return found
 
     def _force(
         self, comparisons: Sequence[Comparison], laws: Mapping[str, LawResult]

@@ -11,8 +11,9 @@ from pydantic_core import PydanticCustomError
 from thsa_cosim.errors import did_you_mean
 from thsa_cosim.laws import FORMS
 from thsa_cosim.scenario.recording_schema import RecordingsTable, TemperatureTable
-from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order
-from thsa_cosim.search.strategies import Strategy
+from thsa_cosim.scenario.system_schema import ModelTable
+from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order, check_pairs
+from thsa_cosim.search.strategies import SearchMethod, Strategy
 
 
 class LawTable(Table):
@@ -149,10 +150,7 @@ class CostTable(Table):
     @field_validator("mask")
     @classmethod
     def _mask(cls, mask: list[list[float]]) -> list[list[float]]:
-        for pair in mask:
-            if len(pair) != 2 or not pair[0] < pair[1]:
-                raise PydanticCustomError("mask", "must hold pairs [from, to] in s with from below to")
-        return mask
+        return check_pairs(mask)
 
 
 class EvolutionTable(Table):
@@ -173,10 +171,13 @@ class EvolutionTable(Table):
 
 
 class SearchTable(EvolutionTable):
-    """``[search]``: differential evolution, the article's setting by default."""
+    """``[search]``: local searches first, differential evolution where they do not agree on a minimum."""
 
+    method: SearchMethod = "local-first"
+    """``"local-first"``: least squares from spread starts; differential evolution only where they do not agree.
+    ``"differential-evolution"``: that alone, the article's way."""
     polish: bool = True
-    """Least squares from the best vector; standard errors need it."""
+    """Least squares from the best vector; standard errors need it. Without it the evolution runs alone."""
     profile: list[Name] = Field(default_factory=list)
     """Names of parameters whose profile likelihood is computed."""
 
@@ -186,10 +187,17 @@ class SimulationTable(Table):
 
     interface: Literal["co-simulation", "model-exchange"] | None = None
     """Left out: Co-Simulation if the FMU has it."""
+    inputs: Literal["hold", "mean", "derivative", "intermediate"] | None = None
+    """How inputs that run linearly reach a Co-Simulation FMU within a step: held at its begin or at its mean, by input
+    derivatives (FMI 2.0), by intermediate update (FMI 3.0). Left out: the best one in a trial on the first recording,
+    which may be Model Exchange if ``interface`` is left out too."""
     tolerance: Annotated[float, Field(gt=0, lt=1)] | None = None
     """Relative tolerance handed to the FMU (or to CVODE); left out: the FMU's own."""
     step: Positive | None = None
     """s between communication points; left out: the recording's samples."""
+    stepping: Literal["free", "samples"] = "free"
+    """An FMU that this package exported is given the whole run at once, so that its solver steps across samples;
+    ``"samples"`` communicates at every one of them, as with other FMUs."""
     deadline: Positive = 60.0
     """s; a run that takes longer is killed and counts as failed."""
     memory: Positive | None = None
@@ -217,15 +225,13 @@ class ForceTable(Table):
     """s after which the motion repeats; what its laps differ by is printed beside the residual."""
 
 
-class CommonTable(Table):
+class CommonTable(ModelTable):
     """Keys of every kind that runs an FMU against recordings."""
 
     kind: str
     """What to do: the command of that name runs it."""
     title: str = ""
     """Shown in tables, plots and ``result.json``."""
-    fmu: Name
-    """Path of the FMU. ``--fmu`` replaces it."""
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
     """Of the search; the same seed repeats a study exactly. ``--seed`` replaces it."""
     recordings: RecordingsTable

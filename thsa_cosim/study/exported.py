@@ -12,7 +12,7 @@ from thsa_cosim.study.digest import digest_of_folder, digest_of_text
 from thsa_cosim.study.identity import MODELICA
 
 #: Packages that have a part in an export.
-_TOOLS = ("casadi", "fmpy", "rumoca", "ziglang")
+_TOOLS = ("casadi", "fmpy", "ziglang")
 
 
 def export_digest(source: str, package: Path, platforms: Sequence[str] | None) -> str:

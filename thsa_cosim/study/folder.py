@@ -29,6 +29,7 @@ def describe(scenario: Scenario | TuneScenario, command: str) -> dict[str, objec
         "scenario": str(scenario.path),
         "command": command,
         "fmu": str(scenario.fmu.path),
+        "method": scenario.search.method,
         "population": scenario.search.population,
         "generations": scenario.search.generations,
         "parameters": {p.name: p.unit for p in scenario.parameters.parameters},

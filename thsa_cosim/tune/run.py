@@ -76,6 +76,7 @@ def tune(
         try:
             experiments = [case.experiment for case in cases_of([*groups, study.check])]
             with open_runner(scenario.simulation, experiments, workers, cluster) as runner:
+                study.notes += runner.notes
                 evaluator = Evaluator(scenario, runner, journal, groups, names, on_progress)
                 study.run(evaluator, journal)
         except KeyboardInterrupt:

@@ -24,7 +24,6 @@ COMMAND = np.interp(TIME, [0.1, 0.3, 0.9, 1.3, 1.7, 1.9], [0.0, SPEED, SPEED, -S
 
 @pytest.fixture(scope="module")
 def superset(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
-    pytest.importorskip("rumoca")
     folder = tmp_path_factory.mktemp("superset")
     effects = [*known_effects().values(), EMPIRICAL]
     fmu, *_ = build_superset("Actuator", ROOT / "modelica" / "THSA", effects, folder)

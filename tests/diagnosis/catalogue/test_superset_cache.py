@@ -13,7 +13,6 @@ from thsa_cosim.diagnosis.catalogue.superset import build_superset
 from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import Signals
 
-pytest.importorskip("rumoca")
 PACKAGE = Path(__file__).parents[3] / "modelica" / "THSA"
 WINDAGE = "Effects/Windage.mo"
 

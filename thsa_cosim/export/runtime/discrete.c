@@ -196,7 +196,7 @@ double discrete_next(const Instance *c) {
 
 Status discrete_advance(Instance *c, double end) {
     State *s = &c->s;
-    while (s->now.time < end) {
+    while (s->now.time < end && !c->return_early) {
         const double next = discrete_next(c);
         const Status status = solver_advance(c, next < end ? next : end);
         if (status != OK) return status;

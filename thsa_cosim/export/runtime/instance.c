@@ -126,7 +126,26 @@ Status instance_setup(Instance *c, int tolerance_defined, double tolerance, doub
     return OK;
 }
 
-double instance_dead_band(const Instance *c, int k) { return 1e-13 * c->s.now.span[k] + DBL_MIN; }
+double instance_dead_band(const Instance *c, int k) {
+    return fmax(1e-13 * c->s.now.span[k] + DBL_MIN, c->s.now.band[k]);
+}
+
+/* A relation that each branch drives back (sliding along g = 0) changes for ever at the pace of rounding noise. Its dead
+ * band grows until it changes at a pace that can be integrated, to a thousandth of the largest |g| at most. The
+ * Co-Simulation crosses such bursts itself (advance.c). */
+static void widen(Instance *c, int k) {
+    enum { PATIENCE = 12 };
+    Motion *now = &c->s.now;
+    const double band = instance_dead_band(c, k);
+    if (c->kind != MODEL_EXCHANGE) return;
+    now->returns[k] = now->reach[k] < 20.0 * band ? now->returns[k] + 1 : 0;
+    now->reach[k] = 0.0;
+    if (now->returns[k] < PATIENCE || band >= 1e-3 * now->span[k]) return;
+    if (now->band[k] == 0.0)
+        instance_warn(c, "relation %d changes without end from time %.15g on: it gets a dead band", k, now->time);
+    now->band[k] = fmin(4.0 * band, 1e-3 * now->span[k]);
+    now->returns[k] = PATIENCE / 2;
+}
 
 double instance_indicator(const Instance *c, int k) {
     const double band = instance_dead_band(c, k);
@@ -153,6 +172,7 @@ int instance_switch_modes(Instance *c, int report) {
         now->span[k] = fmax(now->span[k], fabs(c->g[k]));
         if (wanted == now->m[k]) continue;
         now->m[k] = wanted;
+        widen(c, k);
         changed++;
         if (report && c->categories & LOG_EVENTS)
             instance_log(c, OK, LOG_EVENTS, "event at time %.17g: relation %d becomes %s", now->time, k,
@@ -191,6 +211,8 @@ Status instance_initialize(Instance *c) {
     if (!s->initial_due) return OK;
     memset(s->now.m, 0, sizeof s->now.m);
     memset(s->now.span, 0, sizeof s->now.span);
+    memset(s->now.band, 0, sizeof s->now.band);
+    memset(s->now.returns, 0, sizeof s->now.returns);
 #if N_EVENTS
     discrete_reset(c);
 #endif
@@ -250,6 +272,7 @@ Status instance_indicators(Instance *c) {
 Status instance_missed_event(Instance *c, int *missed) {
     *missed = 0;
     if (instance_indicators(c) != OK) return DISCARD;
+    for (int k = 0; k < N_G; k++) c->s.now.reach[k] = fmax(c->s.now.reach[k], fabs(c->g[k]));
     for (int k = 0; k < N_G; k++) *missed |= (instance_indicator(c, k) > 0.0) != (c->s.now.m[k] > 0.5);
     return OK;
 }
@@ -423,7 +446,8 @@ Status instance_do_step(Instance *c, double from, double size) {
         s->derivatives_used = 1;
         const Motion before = s->now;
         s->phase = IN_STEP;
-        Status status = discrete_advance(c, end);
+        c->return_early = 0;
+        const Status status = discrete_advance(c, end);
         s->phase = STEP_MODE;
         if (status != OK) {
             s->now = before;

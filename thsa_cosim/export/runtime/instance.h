@@ -29,10 +29,12 @@ enum { RODAS_STAGES = 8 };
 typedef struct {
     double time;
     double step;             /* step size the controller remembers; 0 = none yet */
-    double last_error;       /* scaled error of the last accepted step (PI control) */
     double x[N_X + 1], u[N_U + 1], m[N_M + 1];
     double next[N_T + 1];    /* time of the next tick of each sample */
     double span[N_G + 1];    /* largest |g| seen: scale of the dead band that rounding noise cannot leave */
+    double reach[N_G + 1];   /* largest |g| since the relation changed (Model Exchange) */
+    double band[N_G + 1];    /* dead band of a relation that chatters, else 0 */
+    int returns[N_G + 1];    /* times in a row that it changed back before g had left the band */
 } Motion;
 
 typedef struct {
@@ -52,6 +54,7 @@ typedef struct {
 } State;
 
 typedef struct Instance Instance;
+typedef struct Recorder Recorder;
 
 struct Instance {
     State s;
@@ -60,6 +63,8 @@ struct Instance {
     void (*emit)(Instance *, Status, const char *category, const char *message);
     void (*before_step)(Instance *, double time);  /* FMI 3 intermediate update: inputs wanted at `time` */
     void (*after_step)(Instance *);                /* FMI 3 intermediate update: an internal step is done */
+    int return_early;        /* after_step was told to end the communication step where it is */
+    Recorder *recorder;      /* of the trajectory that is running (trajectory.c), else NULL */
 
     /* caches: valid for the present (time, x, u, p, m) */
     int dx_valid, y_valid, w_valid, g_valid;

@@ -59,17 +59,16 @@ REFUSED = [
 
 @pytest.mark.parametrize(("body", "sentence"), REFUSED, ids=[sentence[:40] for _, sentence in REFUSED])
 def test_refusals_are_as_the_export_page_says(tmp_path: Path, body: str, sentence: str) -> None:
-    for needed in ("casadi",):
-        pytest.importorskip(needed, reason="the export tools are not installed")
+    pytest.importorskip("casadi", reason="the export tools are not installed")
     from thsa_cosim.errors import ModelicaError
     from thsa_cosim.export.causal import make_causal
     from thsa_cosim.export.flatten import flatten
 
     file = tmp_path / "M.mo"
-    file.write_text(f"model M\n{body}\nend M;\n", encoding="utf-8")
+    file.write_text(f"model M {body} end M;\n", encoding="utf-8")
     with pytest.raises(ModelicaError) as caught:
         make_causal(flatten(str(file), ROOT / "modelica" / "THSA"))
-    assert str(caught.value).removeprefix(f"{file}: ") == sentence
+    assert str(caught.value).replace(str(file), "M.mo") == sentence
 
 
 def test_the_export_page_shows_refusals() -> None:

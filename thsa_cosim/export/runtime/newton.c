@@ -70,7 +70,7 @@ static double size_of(int n, const double *step, const double *y) {
     return worst;
 }
 
-static int finite(int n, const double *v) {
+static int all_numbers(int n, const double *v) {
     double sum = 0.0;
     for (int i = 0; i < n; i++) sum += v[i] - v[i];
     return sum == 0.0;
@@ -82,8 +82,8 @@ int newton_solve(int n, double *y, Residual residual, const Point *at, double *w
     for (int turn = 0; turn < MOST_TURNS; turn++) {
         double lambda = 1.0;
         int halvings = 0;
-        if (residual(at, step, matrix) || !finite(n, step)) break;
-        if (newton_linear(n, 1, matrix, step, pivot) || !finite(n, step)) break;
+        if (residual(at, step, matrix) || !all_numbers(n, step)) break;
+        if (newton_linear(n, 1, matrix, step, pivot) || !all_numbers(n, step)) break;
         const double length = size_of(n, step, y);
         memcpy(from, y, sizeof(double) * n);
         if (length < 1e-13) return 0;
@@ -91,10 +91,10 @@ int newton_solve(int n, double *y, Residual residual, const Point *at, double *w
             double correction = 0.0; /* the simplified one that follows, in next */
             int good;
             for (int i = 0; i < n; i++) y[i] = from[i] - lambda * step[i];
-            good = !residual(at, next, NULL) && finite(n, next);
+            good = !residual(at, next, NULL) && all_numbers(n, next);
             if (good) {
                 again(n, matrix, pivot, next);
-                good = finite(n, next);
+                good = all_numbers(n, next);
                 correction = size_of(n, next, y);
             }
             if (good && (correction <= (1.0 - 0.25 * lambda) * length || correction < 1e-13)) {

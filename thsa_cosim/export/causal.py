@@ -83,7 +83,9 @@ class CausalModel:
     blocks: tuple[Block, ...] = ()
     initial_blocks: tuple[Block, ...] = ()
     y_start: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    g_start: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # g at the guesses, where the initial values need modes
+    g_start: ca.SX = field(
+        default_factory=lambda: ca.SX(0, 1)
+    )  # g at the guesses, where the initial values need modes
     assertions: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
 
     @property

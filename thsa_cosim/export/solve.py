@@ -88,7 +88,9 @@ class EquationSystem:
             return self._columns[self._derivatives[self.names[column]]]
 
         limit = 4 * len(incidence) + 16
-        derived = reduce_index(incidence, derivative_of, differentiate_equation, differentiate_variable, limit)
+        derived = reduce_index(
+            incidence, derivative_of, differentiate_equation, differentiate_variable, limit
+        )
         if derived is None:
             raise ModelicaError(
                 f"{model}: the system is structurally singular; constraints cannot be differentiated to an end."

@@ -1,0 +1,196 @@
+"""Every example of the Modelica Standard Library's packages for actuators: exported, simulated, compared.
+
+    python benchmarks/modelica_corpus.py LIBRARY [--references FOLDER] [--only TEXT] [-o FILE.json]
+
+LIBRARY is the folder that holds ``Modelica`` (or ``Modelica 4.1.0``), ``ModelicaServices`` and ``Complex.mo``; FOLDER a
+checkout of modelica/MAP-LIB_ReferenceResults with ``<class as path>/<name>.csv`` and
+``comparisonSignals.txt``. Nothing of either belongs to this repository. Each example is exported for this
+machine, run by its own Co-Simulation over the time
+of its reference, and judged "right", "WRONG", "runs" (no reference, or none of its signals is a variable of the FMU),
+"refused" (with the reason), "fails" (no end of the simulation) or "CRASH".
+
+A signal is right where it lies within a tube around the reference: 2e-3 of its range in value, 2e-3 of the run in time.
+"""
+
+import argparse
+import collections
+import csv
+import json
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+PACKAGES = (
+    "Modelica.Mechanics.Rotational.Examples",
+    "Modelica.Mechanics.Translational.Examples",
+    "Modelica.Electrical.Analog.Examples",
+    "Modelica.Electrical.Machines.Examples.DCMachines",
+    "Modelica.Electrical.Machines.Examples.SynchronousMachines",
+    "Modelica.Blocks.Examples",
+    "Modelica.Thermal.HeatTransfer.Examples",
+)
+SYNCHRONOUS = re.compile(r"SynchronousMachines\.SMPM")
+TUBE = 2e-3
+MOST_SECONDS = 120
+
+
+def examples(library: Path) -> list[str]:
+    """Names of all examples: models of the packages that carry an ``experiment`` annotation."""
+    from thsa_cosim.modelica.library import Library
+
+    found: list[str] = []
+    source = Library([library])
+
+    def walk(name: str) -> None:
+        definition = source.find(name)
+        if definition is None:
+            return
+        if (
+            definition.kind in ("model", "block")
+            and definition.experiment
+            and "partial" not in definition.prefixes
+        ):
+            found.append(name)
+        if definition.kind == "package":
+            for child in source.children(definition):
+                walk(f"{name}.{child}")
+
+    for package in PACKAGES:
+        walk(package)
+    return [n for n in found if "SynchronousMachines" not in n or SYNCHRONOUS.search(n)]
+
+
+def reference(folder: Path | None, name: str) -> tuple[np.ndarray, dict[str, np.ndarray]] | None:
+    """Times and signals of a reference, None where there is none."""
+    if folder is None:
+        return None
+    place = folder.joinpath(*name.split("."))
+    file = place / f"{name.rsplit('.', 1)[-1]}.csv"
+    if not file.is_file():
+        return None
+    with file.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.reader(stream))
+    names = [n.strip().strip('"') for n in rows[0]]
+    values = np.array([[float(v) for v in row[: len(names)]] for row in rows[1:] if row and row[0]])
+    wanted = place / "comparisonSignals.txt"
+    chosen = set(names[1:])
+    if wanted.is_file():
+        chosen &= {line.strip() for line in wanted.read_text(encoding="utf-8").splitlines()}
+    return values[:, 0], {n: values[:, k] for k, n in enumerate(names) if n in chosen and n != names[0]}
+
+
+def in_tube(t: np.ndarray, y: np.ndarray, t_ref: np.ndarray, y_ref: np.ndarray) -> float:
+    """How far y leaves the tube around the reference, in units of the tube's half width; at most 1 is right."""
+    span = max(float(np.ptp(y_ref)), 1e-6 * float(np.max(np.abs(y_ref))), 1e-10)
+    width = TUBE * float(t_ref[-1] - t_ref[0])
+    worst = 0.0
+    for shifts in (np.linspace(-width, width, 9),):
+        moved = np.array([np.interp(t + s, t_ref, y_ref) for s in shifts])
+        inside = (t >= t_ref[0]) & (t <= t_ref[-1])
+        between = (t_ref[None, :] >= t[:, None] - width) & (t_ref[None, :] <= t[:, None] + width)
+        low, high = moved.min(axis=0), moved.max(axis=0)
+        has = between.any(axis=1)
+        low[has] = np.minimum(low[has], np.where(between[has], y_ref[None, :], np.inf).min(axis=1))
+        high[has] = np.maximum(high[has], np.where(between[has], y_ref[None, :], -np.inf).max(axis=1))
+        outside = np.maximum(np.maximum(low - y, y - high), 0.0)[inside]
+        worst = float(np.max(outside, initial=0.0)) / (TUBE * span)
+    return worst
+
+
+def simulate(fmu: Path, t_ref: np.ndarray, names: list[str]) -> dict[str, np.ndarray]:
+    """One run over the reference's time, at 2,000 communication points."""
+    import fmpy
+
+    span = float(t_ref[-1] - t_ref[0])
+    result = fmpy.simulate_fmu(
+        str(fmu), start_time=float(t_ref[0]), stop_time=float(t_ref[-1]), output_interval=span / 2000, output=names,
+        record_events=False, relative_tolerance=1e-7,
+    )  # fmt: skip
+    return {n: np.asarray(result[n], dtype=float) for n in ("time", *names)}
+
+
+def judge(name: str, library: Path, references: Path | None, scratch: Path) -> tuple[str, str]:
+    """What becomes of one example."""
+    import fmpy
+
+    from thsa_cosim.errors import ThsaCosimError
+    from thsa_cosim.export import export_fmu
+    from thsa_cosim.export.compile import PLATFORMS
+
+    fmu = scratch / "example.fmu"
+    try:
+        host = next(p.fmi2 for p in PLATFORMS if p.fmi2 and p.fmi2.startswith(fmpy.platform[:3]))
+        export_fmu(name, package=library / "none", libraries=[library], output=fmu, platforms=[host])
+    except ThsaCosimError as error:
+        return "refused", str(error).replace(str(library), "")
+    variables = {v.name for v in fmpy.read_model_description(str(fmu)).modelVariables}
+    found = reference(references, name)
+    experiment = fmpy.read_model_description(str(fmu)).defaultExperiment
+    t_ref = np.array([0.0, float(experiment.stopTime)]) if found is None else found[0]
+    signals = {} if found is None else {n: y for n, y in found[1].items() if n in variables}
+    try:
+        result = simulate(fmu, t_ref, list(signals))
+    except Exception as error:
+        return "fails", " ".join(str(error).split())[:160]
+    if not signals:
+        return "runs", "no reference" if found is None else "no signal of the reference is in the FMU"
+    worst = {n: in_tube(result["time"], result[n], t_ref, y) for n, y in signals.items()}
+    name_worst = max(worst, key=lambda n: worst[n])
+    return (
+        "right" if worst[name_worst] <= 1.0 else "WRONG"
+    ), f"{worst[name_worst]:.2g} tube widths at {name_worst}"
+
+
+def one(name: str, options: argparse.Namespace) -> tuple[str, str]:
+    """The same in a process of its own."""
+    command = [sys.executable, __file__, str(options.library), "--one", name]
+    if options.references:
+        command += ["--references", str(options.references)]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=MOST_SECONDS)
+    except subprocess.TimeoutExpired:
+        return "fails", f"not done in {MOST_SECONDS} s"
+    try:
+        what, why = json.loads(done.stdout.strip().splitlines()[-1])
+    except (ValueError, IndexError):
+        return "CRASH", " ".join((done.stderr.strip().splitlines() or [str(done.returncode)])[-1].split())[
+            :200
+        ]
+    return str(what), str(why)
+
+
+def main() -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("library", type=Path)
+    parser.add_argument("--references", type=Path)
+    parser.add_argument("--only", default="", help="examples whose name holds this text")
+    parser.add_argument("-o", "--output", type=Path)
+    parser.add_argument("--one", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        with tempfile.TemporaryDirectory() as scratch:
+            print(json.dumps(judge(options.one, options.library, options.references, Path(scratch))))
+        return 0
+    table = {}
+    start = time.perf_counter()
+    for name in examples(options.library):
+        if options.only not in name:
+            continue
+        table[name] = one(name, options)
+        print(f"{table[name][0]:8s} {name.removeprefix('Modelica.'):75s} {table[name][1][:150]}", flush=True)
+    count = collections.Counter(what for what, _ in table.values())
+    print(", ".join(f"{n} {what}" for what, n in count.most_common()), f"of {len(table)}", end="; ")
+    print(f"{time.perf_counter() - start:.0f} s")
+    if options.output:
+        options.output.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    return int(count["WRONG"] + count["CRASH"] > 0)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -8,6 +8,8 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
+from threadpoolctl import threadpool_limits
+
 from thsa_cosim.batch.attempts import Attempt, Batch, fault_of, signal_name
 from thsa_cosim.batch.frames import Done, Order, Ready, Returned, Setup
 from thsa_cosim.batch.inbox import Inbox, open_inbox
@@ -19,7 +21,7 @@ from thsa_cosim.batch.study import Study
 from thsa_cosim.batch.worker import LOST
 from thsa_cosim.errors import ParameterError, StudyError
 from thsa_cosim.fmu.machine import temporary_fault
-from thsa_cosim.fmu.plant import Backend, Kind, Reuse
+from thsa_cosim.fmu.plant import Backend, Kind, Reuse, Stepping
 
 _TICK_S = 0.05
 """How often deadlines, memory and floods are looked at."""
@@ -53,6 +55,7 @@ class LocalRunner:
         deadline_s: float | None = None,
         memory_limit_mb: float | None = None,
         reuse: Reuse = "fresh",
+        stepping: Stepping = "free",
         kind: Kind | None = None,
         backend: Backend | None = None,
         recycle_runs: int = 10_000,
@@ -71,7 +74,7 @@ class LocalRunner:
             MiB that one worker may grow beyond its idle size; None: no limit.
         reuse
             "fresh": a new instance per run. "reset": only for FMUs whose reset is known to be right.
-        kind, backend
+        kind, backend, stepping
             As for ``Plant.open``.
         recycle_runs, recycle_growth_mb
             A worker is replaced after so many runs, or when idle it has grown by so many MiB (leaks).
@@ -104,6 +107,7 @@ class LocalRunner:
             kind=kind,
             backend=backend,
             reuse=reuse,
+            stepping=stepping,
             main=self._study.main,
         )
         self._inbox = open_inbox()
@@ -113,8 +117,10 @@ class LocalRunner:
         self._failed_starts = 0
         self._next_tick = 0.0
         self._typical_s = 1.0
+        # The cores are the workers': a search's small products in BLAS threads cost ten times their own time.
+        blas = threadpool_limits(limits=1, user_api="blas")
         # Also at interpreter exit and when the runner is forgotten; must not refer to self.
-        self._finalizer = weakref.finalize(self, _shut_down, self._workers, self._inbox, self._study)
+        self._finalizer = weakref.finalize(self, _shut_down, self._workers, self._inbox, self._study, blas)
         self._staff(workers)
 
     # -- public ---------------------------------------------------------------------------------------
@@ -374,8 +380,9 @@ class LocalRunner:
         return Status.CRASH, f"the process died by {signal_name(code)}"
 
 
-def _shut_down(workers: list[WorkerProcess], inbox: Inbox, study: Study) -> None:
-    """Stop all workers, idle ones politely, and remove the study's folder."""
+def _shut_down(workers: list[WorkerProcess], inbox: Inbox, study: Study, blas: threadpool_limits) -> None:
+    """Stop all workers, idle ones politely, remove the study's folder, and give BLAS its threads back."""
+    blas.restore_original_limits()
     for worker in workers:
         if not worker.assigned:
             worker.ask_to_stop()

@@ -16,6 +16,7 @@ from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, values_of
+from thsa_cosim.diagnosis.choosing.orders import Machine, machine_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
@@ -33,6 +34,7 @@ from thsa_cosim.diagnosis.fitting.trials import Trial, spec_of, trials_of, with_
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import ChannelError, Comparison, DiagnosisResult, EmpiricalLaw
 from thsa_cosim.errors import StudyError
+from thsa_cosim.export.compile import this_platform
 from thsa_cosim.identify import Comparison as Compared
 from thsa_cosim.identify import ForceBalance, force_balance
 from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
@@ -92,8 +94,10 @@ def diagnose(
     )
     with open_runner(scenario.simulation, [t.experiment for t in driven], workers, cluster) as runner:
         bench = Bench(runner, driven)
-        scan = wave_number_finder(bench, tested.slots, tested.signals_at)
         start = before.fit.vector
+        at_start = {t.case.name: unknowns.assignments(start, t.group) for t in driven if t.part == "fit"}
+        machine = machine_of(tested.slots, tested.signals_at(at_start))
+        scan = wave_number_finder(bench, tested.slots, tested.signals_at, machine)
         found = attribute(
             bench, unknowns, tested.candidates, scan, start=start, seed=scenario.seed, most=spec.most, say=say
         )
@@ -113,6 +117,7 @@ def diagnose(
         bench,
         say,
         tuple(effects),
+        machine,
         box,
     ).result()
 
@@ -133,6 +138,7 @@ class _Closing:
     bench: Bench
     say: Say
     effects: tuple[str, ...]
+    machine: Machine
     box: BlackBox | None = None
 
     def result(self) -> DiagnosisResult:
@@ -175,6 +181,11 @@ class _Closing:
             if terms is not None and self.spec.empirical:
                 # The share stays that of the effects: a law describes and explains nothing.
                 model, extended, after = self._with_law(terms)
+        if model is not None and extended is not None and (here := this_platform()):
+            notes.append(
+                f"{extended.name} is for {here[0]} only; thsa-cosim export {model} --package {self.spec.package}"
+                f" -o {extended} compiles it for all platforms"
+            )
         counts = dict(self.bench.failures)
         changed = after is not before
         for identified in (before, after) if changed else (before,):
@@ -190,7 +201,7 @@ class _Closing:
             fmu=scenario.fmu.path,
             fmu_sha256=scenario.fmu.sha256,
             verdict=verdict,
-            effects=found_effects(found, after.fit),
+            effects=found_effects(found, after.fit, self.machine),
             before=_errors(before),
             after=_errors(after) if changed else {"fit": {}, "validate": {}},
             recordings_before=_errors_by_recording(before),
@@ -217,6 +228,7 @@ class _Closing:
             evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if changed else 0),
             failures=counts,
             notes=tuple(notes),
+            data=self.scenario.data,
         )
 
     def _declared(self) -> Identified:

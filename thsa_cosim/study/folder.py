@@ -35,7 +35,7 @@ def describe(scenario: Scenario | TuneScenario, command: str) -> dict[str, objec
     }
 
 
-def open_study(
+def claim_folder(
     folder: Path, identity: Mapping[str, object], about: Mapping[str, object] | None = None
 ) -> bool:
     """Create ``folder``, or check that it holds the same study; True if it is continued.

@@ -1,0 +1,53 @@
+"""Where simulations run: local processes, or what answers at an address.
+
+To add an executor: a class like ``batch.local.LocalRunner`` in ``thsa_cosim/batch``, and a row in ``BY_SCHEME``.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from thsa_cosim.batch import Experiment, LocalRunner, Runner
+from thsa_cosim.scenario.model import SimulationSpec
+
+OpenRunner = Callable[[SimulationSpec, Sequence[Experiment]], Runner]
+"""Opens processes for experiments, as ``[simulation]`` wants them."""
+
+
+def _dask(experiments: Sequence[Experiment], address: str, **limits: Any) -> Runner:
+    from thsa_cosim.batch.cluster import ClusterRunner  # Dask is an extra
+
+    return ClusterRunner(experiments, address, **limits)
+
+
+#: What is behind an address, by its scheme; without one (``host:8786``) it is a Dask scheduler.
+BY_SCHEME: Mapping[str, Callable[..., Runner]] = {"": _dask, "tcp": _dask, "tls": _dask}
+
+
+@dataclass(frozen=True)
+class Executor:
+    """``workers`` processes of this machine, or those behind the ``address`` of a cluster."""
+
+    workers: int = 1
+    address: str | None = None
+
+    def open_runner(self, spec: SimulationSpec, experiments: Sequence[Experiment]) -> Runner:
+        """Open the processes.
+
+        Raises
+        ------
+        ParameterError, FmuError
+            If an experiment names variables that its FMU does not have.
+        MissingExtraError, StudyError
+            If Dask is not installed, or no scheduler answers.
+        """
+        limits = {
+            "deadline_s": spec.deadline,
+            "memory_limit_mb": spec.memory_mb,
+            "reuse": spec.reuse,
+            "kind": spec.interface,
+        }
+        if self.address is None:
+            return LocalRunner(experiments, workers=self.workers, **limits)  # type: ignore[arg-type]
+        scheme = self.address.partition("://")[0] if "://" in self.address else ""
+        return BY_SCHEME.get(scheme, _dask)(experiments, self.address, **limits)

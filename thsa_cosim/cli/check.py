@@ -68,11 +68,9 @@ def _scenario(path: Path) -> Checked:
     """A scenario loads, or says in one sentence why not; then its data and its FMU."""
     from thsa_cosim.inspection import Inspection
     from thsa_cosim.report.inspection import print_inspection
-    from thsa_cosim.scenario import load_tune
-    from thsa_cosim.scenario.load import read_toml
-    from thsa_cosim.scenario.stages import load_study
+    from thsa_cosim.scenario import load
 
-    loaded = load_tune(path) if read_toml(path).get("kind") == "tune" else load_study(path)
+    loaded = load(path)
     data = Inspection()
     verdict = {"good": "ok", "usable": "warning", "bad": "failed"}[data.verdict]
     content = {

@@ -143,20 +143,3 @@ class IdentifyResult:
     notes: tuple[str, ...] = ()
     settings: Mapping[str, object] = field(default_factory=dict)
     force: ForceBalance | None = None
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a study is; ``planned`` shrinks when a search converges early.
-
-    ``runs`` counts simulations (evaluated vector × recording), ``reused`` those taken from the journal.
-    ``best``: lowest cost per sample so far, by point.
-    """
-
-    stage: str
-    runs: int
-    planned: int
-    reused: int
-    failures: int
-    best: Mapping[str, float]
-    generation: int

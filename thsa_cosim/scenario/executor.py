@@ -17,7 +17,8 @@ OpenRunner = Callable[[SimulationSpec, Sequence[Experiment]], Runner]
 def _dask(experiments: Sequence[Experiment], address: str, **limits: Any) -> Runner:
     from thsa_cosim.batch.cluster import ClusterRunner  # Dask is an extra
 
-    return ClusterRunner(experiments, address, **limits)
+    runner: Runner = ClusterRunner(experiments, address, **limits)
+    return runner
 
 
 #: What is behind an address, by its scheme; without one (``host:8786``) it is a Dask scheduler.
@@ -41,13 +42,13 @@ class Executor:
         MissingExtraError, StudyError
             If Dask is not installed, or no scheduler answers.
         """
-        limits = {
+        limits: dict[str, Any] = {
             "deadline_s": spec.deadline,
             "memory_limit_mb": spec.memory_mb,
             "reuse": spec.reuse,
             "kind": spec.interface,
         }
         if self.address is None:
-            return LocalRunner(experiments, workers=self.workers, **limits)  # type: ignore[arg-type]
+            return LocalRunner(experiments, workers=self.workers, **limits)
         scheme = self.address.partition("://")[0] if "://" in self.address else ""
-        return BY_SCHEME.get(scheme, _dask)(experiments, self.address, **limits)
+        return BY_SCHEME[scheme if scheme in BY_SCHEME else ""](experiments, self.address, **limits)

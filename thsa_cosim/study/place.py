@@ -32,7 +32,7 @@ class Place:
     """``folder`` keeps the study, ``executor`` runs it, ``on_progress`` is told, ``command`` repeats it."""
 
     folder: Path
-    executor: Executor = Executor()
+    executor: Executor = field(default_factory=Executor)
     on_progress: OnProgress | None = None
     command: str = ""
     """Empty for a study that a script runs."""

@@ -15,7 +15,7 @@ import os
 import pickle
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self
@@ -24,7 +24,7 @@ import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Outcome, Runner, Status
 from thsa_cosim.batch.runner import OnOutcome
-from thsa_cosim.errors import InputError
+from thsa_cosim.errors import InputError, MachineError
 from thsa_cosim.signals import Signals
 
 RUNS = "runs.log"
@@ -75,7 +75,12 @@ class RunLog:
         return _decoded(os.pread(self._file.fileno(), found[1], found[0]))
 
     def append(self, key: bytes, outcome: Outcome) -> None:
-        """Keep an outcome, unless it is so large that running again is cheaper. OSError leaves the log as it was."""
+        """Keep an outcome, unless it is so large that running again is cheaper.
+
+        MachineError if it cannot be written; the log is then as it was before. A machine's fault is no outcome.
+        """
+        if outcome.status is Status.MACHINE:
+            return
         size = sum(a.nbytes for a in _arrays(outcome))
         allowed = BASE + PER_SECOND * (self._seconds + outcome.duration_s)
         if key in self._at or (size > SMALL and self._end + size > allowed):
@@ -87,9 +92,12 @@ class RunLog:
         try:
             while data:
                 data = data[self._file.write(data) :]
-        except OSError:
+        except OSError as error:
             self._file.truncate(begin)
-            raise
+            raise MachineError(
+                f"The study folder {self.path.parent} cannot be written ({error.strerror}); repair that, or make room,"
+                " and give the same command again."
+            ) from None
         self._end = begin + _FRAME.size + len(record)
         self._at[key] = (self._end - len(content), len(content))
         self._seconds += outcome.duration_s
@@ -222,7 +230,8 @@ def _encoded(outcome: Outcome) -> bytes:
         "reduced": None if reduced is None else list(reduced.shape),
     }
     if signals is not None:
-        meta["signals"] = {"names": list(signals.names), "units": dict(signals.units), "n": signals.time.size}
+        meta["signals"] = {"names": list(signals.names), "units": dict(signals.units)}
+        meta["signals"] |= {"held": sorted(signals.held), "n": signals.time.size}
     head = json.dumps(meta).encode()
     body = b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in _arrays(outcome))
     return struct.pack("<I", len(head)) + head + body
@@ -240,7 +249,12 @@ def _decoded(content: bytes) -> Outcome:
     if (kept := meta.get("signals")) is not None:
         n = kept["n"]
         columns = [numbers[k * n : (k + 1) * n] for k in range(len(kept["names"]) + 1)]
-        signals = Signals(columns[0], dict(zip(kept["names"], columns[1:], strict=True)), kept["units"])
+        signals = Signals(
+            columns[0],
+            dict(zip(kept["names"], columns[1:], strict=True)),
+            kept["units"],
+            frozenset(kept["held"]),
+        )
         position = n * len(columns)
     shape = meta["reduced"]
     return Outcome(

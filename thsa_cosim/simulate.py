@@ -127,7 +127,8 @@ def simulate(scenario: Scenario, place: Place) -> SimulateResult:
     with Study.open(place, study_identity(scenario, "simulate"), describe(scenario)) as study:
         with study.open_runner(scenario.simulation, experiments) as runner:
             outcomes = runner.run([Job(e.name) for *_, e in cases], count)
-        result = _written(place.folder, scenario, cases, outcomes)
+            notes = (*scenario.notes, *runner.notes)
+        result = _written(place.folder, scenario, cases, outcomes, notes)
         study.complete()
     return result
 
@@ -137,6 +138,7 @@ def _written(
     scenario: Scenario,
     cases: Sequence[tuple[Recording, str, Experiment]],
     outcomes: Sequence[Outcome],
+    notes: tuple[str, ...],
 ) -> SimulateResult:
     """Compare, and write what was found; StudyError if every simulation failed."""
     results = tuple(
@@ -148,7 +150,7 @@ def _written(
         reason, number = failures.most_common(1)[0]
         raise StudyError(f"All {len(results)} simulations failed, {number} of them because {reason}.")
     files = [_write_csv(folder, r) for r in results if r.simulated is not None]
-    result = SimulateResult(scenario, results, failures, (folder / RESULT, *files), scenario.notes)
+    result = SimulateResult(scenario, results, failures, (folder / RESULT, *files), notes)
     partial = folder / f"{RESULT}.part"
     partial.write_text(json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     partial.replace(folder / RESULT)

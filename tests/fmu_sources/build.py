@@ -89,7 +89,8 @@ LAG2 = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 LAG3 = """<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="3.0" modelName="Lag3" instantiationToken="{{lag3}}">
+<fmiModelDescription fmiVersion="3.0" modelName="Lag3" instantiationToken="{{lag3}}"
+  generationTool="thsa-cosim tests">
  <ModelExchange modelIdentifier="lag3" providesDirectionalDerivatives="true"/>
  <CoSimulation modelIdentifier="lag3" canHandleVariableCommunicationStepSize="true"
    providesIntermediateUpdate="{updates}"/>
@@ -230,15 +231,18 @@ def write_fmu(
 
 
 @cache
-def lag2(*defines: str, interpolates: bool = True, guid: str = "{lag}") -> Path:
-    """The first-order lag of lag2.c, FMI 2.0."""
+def lag2(
+    *defines: str, interpolates: bool = True, guid: str = "{lag}", tool: str = "thsa-cosim tests"
+) -> Path:
+    """The first-order lag of lag2.c, FMI 2.0; another ``tool`` makes it a foreign FMU."""
     name = (
         "lag2"
         + "_".join(["", *defines])
         + ("" if interpolates else "_held")
         + ("" if guid == "{lag}" else "_bad")
+        + ("" if tool == "thsa-cosim tests" else "_foreign")
     )
-    xml = LAG2.format(guid=guid, interpolates=str(interpolates).lower())
+    xml = LAG2.format(guid=guid, interpolates=str(interpolates).lower()).replace("thsa-cosim tests", tool)
     return write_fmu(_folder() / f"{name}.fmu", xml, library("lag2.c", *defines), "lag2")
 
 

@@ -91,7 +91,7 @@ def unfold(page: Any) -> None:
     for fold in page.query_selector_all("details:not([open]) > summary"):
         fold.click()
     for plot in page.query_selector_all(".plot"):
-        page.wait_for_selector(f".plot[data-drawn]#{plot.get_attribute('id')}")
+        page.wait_for_selector(f'.plot[data-drawn][id="{plot.get_attribute("id")}"]')
 
 
 def plots(page: Any) -> dict[str, Any]:
@@ -132,8 +132,8 @@ def test_every_plot_is_drawn_with_units_on_its_axes_and_nothing_complains(
     identified: Any, tuned: Any
 ) -> None:
     expected = (
-        {"laws", "signals-0", "signals-1", "convergence"},
-        {"response-0", "plane", "pareto", "convergence"},
+        {"laws", "fit-run_-30", "fit-run_25", "convergence"},
+        {"response-T_amb_-30_degC", "surface", "pareto", "convergence"},
     )
     for page, names in zip((identified, tuned), expected, strict=True):
         found = plots(page)
@@ -213,21 +213,21 @@ def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(diag
         "dependence",
         "dependence-0",
         "dependence-1",
-        "signals-0",
-        "signals-1",
+        "fit-fit_1",
+        "validate-validate_1",
     }
     assert len(found["balance"].query_selector_all(".barlayer .point path")) == 2
     # Each channel's clearest dependence stands out, the others are below in order.
     assert axis_titles(found["dependence"]) == ["u_q [V]", "x [m]", "v [m/s]", "i_q [A]"]
     order = axis_titles(found["dependence-0"])[:7]
     assert order == ["u_q [V]", "i_q [A]", "w_m [rad/s]", "x [m]", "F_load [N]", "v_cmd [m/s]", "time [s]"]
-    names = found["signals-0"].evaluate("p => p._fullData.map(t => t.name)")
+    names = found["fit-fit_1"].evaluate("p => p._fullData.map(t => t.name)")
     assert names == ["measured", "before", "after", "residual before", "residual after"]
     assert page.troubles == []
 
 
 def test_single_wrong_sample_of_thousands_is_in_the_plot(identified: Any) -> None:
-    plot = plots(identified)["signals-1"]
+    plot = plots(identified)["fit-run_25"]
     drawn = plot.evaluate("p => p._fullData.filter(t => t.name === 'residual').map(t => Math.min(...t.y))")
     assert drawn[0] == pytest.approx(-studies.SPIKE, abs=0.3)
     assert plot.evaluate("p => p._fullData[0].x.length") < 3000
@@ -270,7 +270,7 @@ def test_tuning_shows_gains_requirements_line_and_what_was_broken_before(tuned: 
         "good",
         "good",
     ]
-    names = plots(tuned)["plane"].evaluate("p => p._fullData.filter(t => t.showlegend).map(t => t.name)")
+    names = plots(tuned)["surface"].evaluate("p => p._fullData.filter(t => t.showlegend).map(t => t.name)")
     assert {"breaks a hard requirement", "before", "after", "article", "generation 0", "generation 3"} <= set(
         names
     )

@@ -30,6 +30,7 @@ from thsa_cosim.signals import Signals
 from thsa_cosim.study import claim_folder
 
 ROOT = Path(__file__).parents[2]
+LOCAL_FIRST, EVOLUTION = 'method = "local-first"', 'method = "differential-evolution"'
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +40,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.skip("fmus/Motor.fmu has not been exported")
     folder = tmp_path_factory.mktemp("report")
     # The few vectors of this search find nothing; what is looked at is what they leave behind.
-    scenario = small_scenario(folder, **{"population = 12": "population = 6", "stop = 3.0": "stop = 1.0"})
+    changes = {"population = 12": "population = 6", "stop = 3.0": "stop = 1.0", LOCAL_FIRST: EVOLUTION}
+    scenario = small_scenario(folder, **changes)
     held_out = ROOT / "scenarios" / "recordings" / "motor_m10.parquet"
     command = [
         "identify",

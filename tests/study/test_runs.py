@@ -25,7 +25,9 @@ def outcome(seed: int = 0, status: Status = Status.OK) -> Outcome:
     rng = np.random.default_rng(seed)
     if status is not Status.OK:
         return Outcome(status, "why not: α", None, None, 0.25, "console\n")
-    signals = Signals(TIME, {"y": rng.normal(size=11), "u": rng.normal(size=11)}, {"y": "m/s"}, frozenset({"u"}))
+    signals = Signals(
+        TIME, {"y": rng.normal(size=11), "u": rng.normal(size=11)}, {"y": "m/s"}, frozenset({"u"})
+    )
     return Outcome(status, "", signals, rng.normal(size=3), 0.1 + seed)
 
 
@@ -34,12 +36,17 @@ def same(one: Outcome | None, other: Outcome) -> bool:
     assert one is not None
     facts = [(o.status, o.reason, o.duration_s, o.console) for o in (one, other)]
     arrays = [[a.tobytes() for a in runs._arrays(o)] for o in (one, other)]
-    kept = [None if o.signals is None else (o.signals.names, o.signals.units, o.signals.held) for o in (one, other)]
+    kept = [
+        None if o.signals is None else (o.signals.names, o.signals.units, o.signals.held)
+        for o in (one, other)
+    ]
     return facts[0] == facts[1] and arrays[0] == arrays[1] and kept[0] == kept[1]
 
 
 class Counting:
     """A runner that makes an outcome of the job's values and notes what it ran; it may stop in the midst."""
+
+    notes: Sequence[str] = ()
 
     def __init__(self, stop_after: int = 10**9) -> None:
         self.ran: list[tuple[str, dict[str, float]]] = []
@@ -127,7 +134,9 @@ def test_a_machines_fault_is_never_kept(tmp_path: Path) -> None:
         assert log.known(KEY) is None
 
 
-def test_a_full_disk_names_the_folder_and_tears_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_names_the_folder_and_tears_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with RunLog.open(tmp_path / RUNS) as log:
         log.append(KEY, outcome(1))
         file = log._file
@@ -141,7 +150,9 @@ def test_a_full_disk_names_the_folder_and_tears_nothing(tmp_path: Path, monkeypa
                 return getattr(file, name)
 
         log._file = Full()  # type: ignore[assignment]
-        with pytest.raises(MachineError, match="cannot be written .*make room.*same command again") as caught:
+        with pytest.raises(
+            MachineError, match=r"cannot be written .*make room.*same command again"
+        ) as caught:
             log.append(b"m" * 16, outcome(2))
         assert str(tmp_path) in str(caught.value)
     with RunLog.open(tmp_path / RUNS) as log:
@@ -149,7 +160,9 @@ def test_a_full_disk_names_the_folder_and_tears_nothing(tmp_path: Path, monkeypa
         assert log.known(b"m" * 16) is None
 
 
-def test_large_outcomes_are_kept_as_far_as_that_is_cheaper(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_outcomes_are_kept_as_far_as_that_is_cheaper(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(runs, "BASE", 10_000)
     monkeypatch.setattr(runs, "PER_SECOND", 100_000)
     large = Outcome(Status.OK, reduced=np.zeros(1000), duration_s=1e-3)
@@ -193,7 +206,9 @@ def changed_experiments(experiment: Experiment) -> dict[str, Experiment]:
     }
 
 
-@pytest.mark.parametrize("what", ["fmu", "inputs", "no inputs", "outputs", "time", "fixed", "tolerance", "reduce"])
+@pytest.mark.parametrize(
+    "what", ["fmu", "inputs", "no inputs", "outputs", "time", "fixed", "tolerance", "reduce"]
+)
 def test_another_run_is_not_looked_up(tmp_path: Path, experiment: Experiment, what: str) -> None:
     job, other = Job("fit/a", {"seed": 1.0}), changed_experiments(experiment)[what]
     with RunLog.open(tmp_path / RUNS) as log:

@@ -3,7 +3,7 @@
 ``run``      identify, tune, diagnose, simulate: a scenario in, a study out
 ``conduct``  the table of kinds, and how a study of any of them is conducted (the command line does it so, too)
 ``study``    what every study folder says; ``kinds``: what each kind says besides
-``figures``  its plots
+``several``  the studies of a folder, and what differs between some of them
 
 ``import thsa_cosim as tc`` offers all of it as ``tc.identify(...)`` and so on. A study is read from its folder, so
 that one that was run elsewhere opens as one that has just been run.
@@ -12,6 +12,7 @@ that one that was run elsewhere opens as one that has just been run.
 from thsa_cosim.api.conduct import cores, default_folder
 from thsa_cosim.api.kinds import DiagnoseStudy, IdentifyStudy, SimulateStudy, TuneStudy, open_study
 from thsa_cosim.api.run import diagnose, identify, simulate, tune
+from thsa_cosim.api.several import compare, list_studies
 from thsa_cosim.api.study import Study
 
 __all__ = [
@@ -20,10 +21,12 @@ __all__ = [
     "SimulateStudy",
     "Study",
     "TuneStudy",
+    "compare",
     "cores",
     "default_folder",
     "diagnose",
     "identify",
+    "list_studies",
     "open_study",
     "simulate",
     "tune",

@@ -3,7 +3,7 @@
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ LONG_S = 5.0
 
 @dataclass(frozen=True)
 class Search:
-    """One search of a study: at most ``vectors`` parameter vectors, each simulated once per ``cases``."""
+    """One search of a study: ``vectors`` parameter vectors, each simulated once per ``cases``."""
 
     label: str
     cases: tuple[str, ...]
@@ -30,13 +30,16 @@ class Search:
 
     @property
     def runs(self) -> int:
-        """Simulations at most."""
+        """Simulations."""
         return self.vectors * len(self.cases)
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """What a scenario would run on ``workers`` processes; ``seconds`` is for all of it, at most.
+    """What a scenario would run on ``workers`` processes; ``seconds`` is for all of it.
+
+    ``expected``: local searches come first, and the runs are what they take where they agree; an evolution would be
+    added where they do not. Otherwise the runs are the most that can happen.
 
     ``timed`` runs gave ``run_s``, the wall time between two finished runs; ``failures`` of them by reason.
     ``also`` are simulations besides the searches (a map of the cost, held-out recordings, comparisons).
@@ -49,15 +52,16 @@ class Forecast:
     timed: int
     run_s: float
     failures: dict[str, int]
+    expected: bool = False
 
     @property
     def runs(self) -> int:
-        """Simulations at most."""
+        """Simulations, at most or expected."""
         return sum(search.runs for search in self.searches) + self.also
 
     @property
     def seconds(self) -> float:
-        """Wall time at most, s: a search that converges ends before its last generation."""
+        """Wall time, s."""
         return self.runs * self.run_s
 
 
@@ -94,7 +98,9 @@ def _of_recordings(scenario: Scenario, executor: Executor) -> Forecast:
         for r in alone
     ]
     title = scenario.title or scenario.path.stem
-    return _timed(title, searches, len(alone), asks, scenario.simulation, scenario.seed, executor)
+    found = _timed(title, searches, len(alone), asks, scenario.simulation, scenario.seed, executor)
+    locally = bool(searches) and scenario.search.method == "local-first" and scenario.search.polish
+    return replace(found, expected=locally)
 
 
 def _of_tuning(scenario: TuneScenario, executor: Executor) -> Forecast:

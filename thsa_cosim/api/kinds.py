@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,6 @@ from thsa_cosim.errors import InputError, did_you_mean
 if TYPE_CHECKING:
     import pandas as pd
 
-    from thsa_cosim.api.figures import Drawing
     from thsa_cosim.laws import Law
 
 
@@ -70,23 +69,6 @@ class IdentifyStudy(Study):
             None if covariance is None else np.array(covariance, dtype=np.float64),
         )
 
-    def drawings(self) -> Mapping[str, Callable[[], "Drawing"]]:
-        """Plots by name, besides those of the recordings, as functions that draw them."""
-        from thsa_cosim.api import figures
-
-        found: dict[str, Callable[[], Drawing]] = {}
-        if self.result["laws"]:
-            found["laws"] = lambda: figures.laws(self, list(self.result["laws"]))
-            for name in self.result["laws"]:
-                found[name] = lambda name=name: figures.laws(self, [name])  # type: ignore[misc]
-        if searches := {
-            str(point["label"]): [g["best_cost"] * _per_sample(point) for g in point["generations"]]
-            for point in self.parts("points")
-            if point.get("generations")
-        }:
-            found["convergence"] = lambda: figures.convergence(searches, "best cost per sample [1]")
-        return found
-
 
 class TuneStudy(Study):
     """What a tuning found."""
@@ -127,25 +109,9 @@ class TuneStudy(Study):
 
         return pd.DataFrame(self.result.get("schedule") or [])
 
-    @property
-    def plots(self) -> tuple[str, ...]:
-        """What :meth:`plot` can draw: the schedule, if there is one, responses by their condition, the search."""
-        own = self.drawings()
-        return (*(n for n in own if n == "schedule"), *self.files, *(n for n in own if n != "schedule"))
-
-    def drawings(self) -> Mapping[str, Callable[[], "Drawing"]]:
-        """Plots by name, besides those of the recordings, as functions that draw them."""
-        from thsa_cosim.api import figures
-
-        found: dict[str, Callable[[], Drawing]] = {}
-        if len(self.result.get("schedule") or ()) > 1:
-            found["schedule"] = lambda: figures.schedule(self)
-        if searches := {
-            str(g["label"]): [c if c is not None and c < _INFEASIBLE else math.nan for c in g["best_cost"]]
-            for g in self.result["groups"]
-        }:
-            found["convergence"] = lambda: figures.convergence(searches, "best cost [1]")
-        return found
+    def _rank(self, name: str) -> int:
+        """The search comes last: a tuning is about the responses."""
+        return 99 if name == "convergence" else super()._rank(name)
 
 
 class SimulateStudy(Study):
@@ -157,7 +123,7 @@ class DiagnoseStudy(Study):
 
     @property
     def verdict(self) -> str:
-        """``missing-effect``, ``no-missing-effect`` or ``unexplained-structure``."""
+        """``missing-effect``, ``no-missing-effect``, ``unexplained-structure`` or ``not-tested``."""
         return str(self.result["verdict"])
 
     @property
@@ -193,9 +159,6 @@ class DiagnoseStudy(Study):
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("signal")
 
 
-_INFEASIBLE = 1e9
-
-
 def open_study(folder: Path | str) -> Study:
     """Open the study in ``folder``; its class follows from its kind.
 
@@ -222,7 +185,3 @@ def open_study(folder: Path | str) -> Study:
 def _where(point: Mapping[str, Any]) -> Any:
     temperature = point["temperature_degC"]
     return point.get("label", "all") if temperature is None else temperature
-
-
-def _per_sample(point: Mapping[str, Any]) -> float:
-    return float(point["cost_per_sample"] / point["cost"]) if point.get("cost") else 1.0

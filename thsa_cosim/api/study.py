@@ -1,7 +1,7 @@
 """What every study folder says, as tables and figures."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +12,8 @@ from thsa_cosim.errors import InputError, did_you_mean
 if TYPE_CHECKING:
     import pandas as pd
 
-    from thsa_cosim.api.figures import Drawing
+    from thsa_cosim.report.parts.content import Figure
+    from thsa_cosim.report.parts.drawing import Drawing
     from thsa_cosim.report.signal_files import SignalFile
 
 
@@ -101,26 +102,42 @@ class Study:
 
     @property
     def plots(self) -> tuple[str, ...]:
-        """What :meth:`plot` can draw; the first is its default."""
-        return (*self.drawings(), *self.files)
+        """What :meth:`plot` can draw: the figures of the study's page, the most telling first."""
+        return tuple(self._figures)
 
     def plot(self, what: str | None = None) -> "Drawing":
-        """Draw one of ``plots``, or a recording by its name; return a matplotlib figure.
+        """Draw one of ``plots`` (without a name the first), such as a recording; return a matplotlib figure.
 
         Raises InputError if there is nothing of that name.
         """
-        from thsa_cosim.api import figures
+        from thsa_cosim.report.parts.drawing import draw
 
-        known = self.plots
+        known = self._figures
         if not known:
             raise InputError(f"{self.folder}: the study holds nothing to draw; let it finish first.")
-        name = known[0] if what is None else what
-        if name in self.drawings():
-            return self.drawings()[name]()
-        if name in self.files:
-            return figures.recording(self.files[name])
-        hint = did_you_mean(name, known) or f" There are {', '.join(known)}."
-        raise InputError(f"{self.folder}: there is no plot {name!r}.{hint}")
+        name = self.plots[0] if what is None else what
+        if name not in known:
+            hint = did_you_mean(name, known) or f" There are {', '.join(known)}."
+            raise InputError(f"{self.folder}: there is no plot {name!r}.{hint}")
+        return draw(known[name])
+
+    @cached_property
+    def _figures(self) -> "Mapping[str, Figure]":
+        """The page's figures by the names of recordings and laws, else by their own, in the order of ``_rank``."""
+        from thsa_cosim.report.page.pictures import pictures
+        from thsa_cosim.report.signal_files import file_name
+
+        found = pictures(self.folder)
+        names = {name: name.removeprefix("law-") for name in found}
+        for key, file in self.files.items():
+            own = f"{file_name(file.role)}-{file_name(file.name)}"
+            names |= {name: key for name in found if name == own or name.endswith(f"-{own}")}
+        return {names[name]: found[name] for name in sorted(found, key=self._rank)}
+
+    def _rank(self, name: str) -> int:
+        """Where a figure stands among all: what was found, the search, recordings, the rest."""
+        order = ("evidence", "laws", "law-", "schedule", "convergence", "fit-", "validate-", "response-")
+        return next((k for k, start in enumerate(order) if name.startswith(start)), len(order))
 
     def report(self) -> Path:
         """Write the study's HTML page; return its path."""
@@ -135,10 +152,6 @@ class Study:
         """The entries of a list in result.json, of all stages."""
         stages = self.result.get("stages", {}).values()
         return [entry for part in (stages or (self.result,)) for entry in part.get(key, [])]
-
-    def drawings(self) -> Mapping[str, Callable[[], "Drawing"]]:
-        """Plots by name, besides those of the recordings, as functions that draw them."""
-        return {}
 
     @cached_property
     def files(self) -> Mapping[str, "SignalFile"]:

@@ -78,6 +78,7 @@ class ClusterRunner:
             distributed: Any = importlib.import_module("distributed")
         except ImportError:
             raise MissingExtraError("Running on a cluster", "cluster") from None
+        self.notes: Sequence[str] = ()
         self._distributed = distributed
         self._descriptions, self._failures = _describe(experiments)
         self._wrapped = wrapper_names(experiments)

@@ -67,6 +67,8 @@ class Experiment:
     """Relative solver tolerance; None: the FMU's default."""
     reduce: Reducer | None = None
     """Applied in the worker, so that signals need not travel; see ``Outcome.reduced``."""
+    input_mode: str | None = None
+    """How linear inputs are given in Co-Simulation (``fmu.inputs.MODES``); None: as trusted without a trial."""
     wrapper: Wrapper | None = None
     """Runs the FMU in place of a plain simulation; jobs may set its parameters like those of the FMU."""
 

@@ -88,6 +88,7 @@ class LocalRunner:
         """
         if workers < 1:
             raise ParameterError(f"workers is {workers}; it must be at least 1.")
+        self.notes: Sequence[str] = ()
         self._study = Study(experiments)
         self._wrapped = wrapper_names(experiments)
         self._count = workers

@@ -220,6 +220,7 @@ class Worker:
             )
             self._plants[folder] = plant
         self._live = plant
+        plant.input_mode = experiment.input_mode
         return experiment, plant
 
     def _watch_memory(self) -> None:

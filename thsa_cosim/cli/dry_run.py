@@ -59,15 +59,18 @@ def _print(asked: "Asked", found: "tuple[Forecast, ...]") -> None:
         out.print(table)
         workers = "1 worker" if part.workers == 1 else f"{part.workers} workers"
         rate = f"{1.0 / part.run_s:.0f} runs/s" if part.run_s < 1.0 else f"{part.run_s:.1f} s a run"
+        much = "about" if part.expected else "at most"
+        more = "; more where local searches do not agree" if part.expected else ""
         out.print(
-            f"at most {part.runs} runs; {part.timed} timed: {rate} with {workers},"
-            f" at most {duration(part.seconds)}",
+            f"{much} {part.runs} runs; {part.timed} timed: {rate} with {workers},"
+            f" {much} {duration(part.seconds)}{more}",
             highlight=False,
         )
         for reason, count in part.failures.items():
             out.print(Text(f"{count} of the timed runs failed: {reason}"))
     if len(found) > 1:
-        out.print(f"together at most {duration(sum(part.seconds for part in found))}", highlight=False)
+        much = "about" if any(part.expected for part in found) else "at most"
+        out.print(f"together {much} {duration(sum(part.seconds for part in found))}", highlight=False)
     folder = asked.place.folder
     what = "would be continued" if folder.exists() else "would be made"
     out.print(f"the study folder {folder} {what}; nothing was written", highlight=False, soft_wrap=True)

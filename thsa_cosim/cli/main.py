@@ -22,6 +22,7 @@ from thsa_cosim.cli.init import init
 from thsa_cosim.cli.options import Interrupted
 from thsa_cosim.cli.report import report
 from thsa_cosim.cli.simulate import simulate
+from thsa_cosim.cli.studies import compare, list_command
 from thsa_cosim.cli.tune import tune
 from thsa_cosim.errors import ThsaCosimError, did_you_mean
 
@@ -35,6 +36,8 @@ COMMANDS: tuple[click.Command, ...] = (
     tune,
     diagnose,
     report,
+    list_command,
+    compare,
     demo,
     example,
     completion,

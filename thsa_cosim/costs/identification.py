@@ -11,7 +11,6 @@ tuning constant 1.345 (95 % efficiency under normal noise), scaled to r² near 0
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,17 +26,15 @@ ABSOLUTE_WIDTH = 0.1
 class ErrorFunction:
     """One f of equation 6, with the smooth stand-in that the least-squares polish minimises.
 
-    ``value``: r (n,) → f(r) (n,). ``psi`` and ``slope``: half the first and second derivative of the
-    stand-in, for the sandwich covariance. ``smooth_loss`` and ``smooth_width`` name that stand-in in the
-    terms of ``scipy.optimize.least_squares``.
+    ``value``: r (n,) → f(r) (n,). ``smooth``: the stand-in (n,). ``psi`` and ``slope``: half its first and
+    second derivative, for the search and the sandwich covariance.
     """
 
     name: str
     value: Callable[[FloatArray], FloatArray]
     psi: Callable[[FloatArray], FloatArray]
     slope: Callable[[FloatArray], FloatArray]
-    smooth_loss: Literal["linear", "huber", "soft_l1"]
-    smooth_width: float
+    smooth: Callable[[FloatArray], FloatArray]
 
 
 def _huber(r: FloatArray) -> FloatArray:
@@ -47,14 +44,13 @@ def _huber(r: FloatArray) -> FloatArray:
 
 ERRORS: Mapping[str, ErrorFunction] = MappingProxyType(
     {
-        "squared": ErrorFunction("squared", np.square, lambda r: r, np.ones_like, "linear", 1.0),
+        "squared": ErrorFunction("squared", np.square, lambda r: r, np.ones_like, np.square),
         "huber": ErrorFunction(
             "huber",
             _huber,
             lambda r: np.clip(r, -HUBER_WIDTH, HUBER_WIDTH),
             lambda r: (np.abs(r) <= HUBER_WIDTH).astype(np.float64),
-            "huber",
-            HUBER_WIDTH,
+            _huber,
         ),
         # |r| has no derivative at 0; the polish rounds it off within a tenth of the noise.
         "absolute": ErrorFunction(
@@ -62,8 +58,7 @@ ERRORS: Mapping[str, ErrorFunction] = MappingProxyType(
             np.abs,
             lambda r: r / np.sqrt(1.0 + (r / ABSOLUTE_WIDTH) ** 2),
             lambda r: (1.0 + (r / ABSOLUTE_WIDTH) ** 2) ** -1.5,
-            "soft_l1",
-            ABSOLUTE_WIDTH,
+            lambda r: 2.0 * ABSOLUTE_WIDTH**2 * (np.sqrt(1.0 + (r / ABSOLUTE_WIDTH) ** 2) - 1.0),
         ),
     }
 )

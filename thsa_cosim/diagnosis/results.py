@@ -8,7 +8,7 @@ from typing import Literal
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.signals import Signals
 
-Verdict = Literal["missing-effect", "no-missing-effect", "unexplained-structure"]
+Verdict = Literal["missing-effect", "no-missing-effect", "unexplained-structure", "not-tested"]
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,20 @@ class ChannelError:
 
 @dataclass(frozen=True)
 class Value:
-    """A fitted number in its unit, with one standard error."""
+    """A fitted number in its unit, with one standard error (infinite: none).
+
+    ``reason``: why the recordings do not determine it; "" if they do.
+    """
 
     value: float
     unit: str
     stderr: float
+    reason: str = ""
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the recordings determine it."""
+        return not self.reason
 
 
 @dataclass(frozen=True)
@@ -135,7 +144,7 @@ class Comparison:
 
 
 Errors = Mapping[str, Mapping[str, ChannelError]]
-"""Part ("fit", "validate") → channel → error."""
+"""Part ("fit", "validate") or recording → channel → error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +162,9 @@ class DiagnosisResult:
     effects: tuple[FoundEffect, ...]
     before: Errors
     after: Errors
+    recordings_before: Errors
+    """Recording → channel → error, of the declared model; ``recordings_after``: of the extended one, if any."""
+    recordings_after: Errors
     declared_before: Mapping[str, Value]
     declared_after: Mapping[str, Value]
     unexplained: float

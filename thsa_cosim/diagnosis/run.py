@@ -18,7 +18,7 @@ from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, values_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
-from thsa_cosim.diagnosis.choosing.verdict import verdict_on
+from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.explaining.balance import close_balances
 from thsa_cosim.diagnosis.explaining.dependence import dependence
@@ -28,7 +28,7 @@ from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified, identify_model
-from thsa_cosim.diagnosis.fitting.structure import errors
+from thsa_cosim.diagnosis.fitting.structure import errors, errors_by_recording
 from thsa_cosim.diagnosis.fitting.trials import Trial, spec_of, trials_of, with_fmu, with_wrapper
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import ChannelError, Comparison, DiagnosisResult, EmpiricalLaw
@@ -105,7 +105,8 @@ def _diagnose(
     if found is None:
         reason = next(iter(bench.failures), "no run succeeded")
         raise StudyError(f"{scenario.path}: the model with all effects cannot be simulated: {reason}")
-    return _Closing(scenario, spec, study, trials, unknowns, before, found, bench, box).result()
+    names = tuple(effect.name for effect in effects)
+    return _Closing(scenario, spec, study, trials, unknowns, before, found, bench, names, box).result()
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,17 +121,20 @@ class _Closing:
     before: Identified
     found: Attribution
     bench: Bench
+    effects: tuple[str, ...]
     box: BlackBox | None = None
 
     def result(self) -> DiagnosisResult:
         """Identify the extended model on its own FMU as the declared one was, and judge both."""
         scenario, found, before = self.scenario, self.found, self._declared()
-        accepted, notes, after = found.accepted, list(found.notes), before
+        accepted, notes, after = found.accepted, [*self.bench.notes, *found.notes], before
         model: Path | None = None
         extended: Path | None = None
         wrapper: Path | None = None
         if self.box is not None:
             notes += self.box.notes
+        if not _tested(found):
+            notes.append(_untested(found, self.effects))
         if accepted:
             wider = extended_unknowns(self.unknowns, accepted)
             hint = found.final.at(wider.names)
@@ -148,7 +152,8 @@ class _Closing:
                 values = {**after.trials[0].case.fixed, **after.fit.unknowns.named(after.fit.vector)}
                 wrapper = write_wrapper(self.study.folder, scenario.fmu.path, self.box.wrapper, values)
         held_out = tuple(t for t in self.trials if t.part == "validate")
-        share, verdict = verdict_on(held_out, before.validate, after.validate, bool(accepted))
+        share = left_over(held_out, before.validate, after.validate)
+        verdict = verdict_on(errors(held_out, after.validate), len(accepted), _tested(found))
         law: EmpiricalLaw | None = None
         if verdict == "unexplained-structure" and self.box is None:
             self.study.place.say("looking for an empirical law")
@@ -166,7 +171,6 @@ class _Closing:
         for identified in (before, after) if changed else (before,):
             for reason, count in identified.failures.items():
                 counts[reason] = counts.get(reason, 0) + count
-        inflation = max(1.0, after.fit.misfit / after.fit.residual.size)
         return DiagnosisResult(
             title=scenario.title or scenario.path.stem,
             status="complete",
@@ -176,11 +180,13 @@ class _Closing:
             fmu=scenario.fmu.path,
             fmu_sha256=scenario.fmu.sha256,
             verdict=verdict,
-            effects=found_effects(found, after.fit, inflation),
+            effects=found_effects(found, after.fit),
             before=_errors(before),
             after=_errors(after) if changed else {"fit": {}, "validate": {}},
+            recordings_before=_errors_by_recording(before),
+            recordings_after=_errors_by_recording(after) if changed else {},
             declared_before=values_of(before.fit, declared=True),
-            declared_after=values_of(after.fit, declared=True, inflation=inflation),
+            declared_after=values_of(after.fit, declared=True),
             unexplained=share,
             model=model,
             extended_fmu=extended,
@@ -244,6 +250,28 @@ def _errors(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
         part: errors(tuple(t for t in identified.trials if t.part == part), residual)
         for part, residual in parts.items()
     }
+
+
+def _errors_by_recording(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
+    found: dict[str, Mapping[str, ChannelError]] = {}
+    for part, residual in (("fit", identified.fit.residual), ("validate", identified.validate)):
+        trials = tuple(t for t in identified.trials if t.part == part)
+        for name, channels in errors_by_recording(trials, residual).items():
+            found[f"{part}/{name}" if name in found else name] = channels
+    return found
+
+
+def _tested(found: Attribution) -> int:
+    """How many proposals the recordings could have told from nothing."""
+    return sum(p.is_testable for r in found.rounds[:1] for p in r.proposals)
+
+
+def _untested(found: Attribution, effects: Iterable[str]) -> str:
+    """Why no effect could be tried."""
+    names = ", ".join(effects)
+    if not any(r.proposals for r in found.rounds):
+        return f"no effect could be tried: the model has no place for {names}"
+    return f"no effect could be tried: nothing in the fit recordings depends on {names}"
 
 
 def _comparisons(before: Identified, after: Identified | None) -> tuple[Comparison, ...]:

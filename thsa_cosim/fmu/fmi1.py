@@ -1,4 +1,4 @@
-"""FMI 1.0 Co-Simulation through fmpy; linear inputs are held at their mean over each step."""
+"""FMI 1.0 Co-Simulation through fmpy; linear inputs are held over each step."""
 
 import ctypes
 from collections.abc import Mapping, Sequence
@@ -26,8 +26,9 @@ def run_fmi1(
     outputs: Sequence[str],
     time: FloatArray,
     progress: FloatArray,
+    mode: str = "mean",
 ) -> Signals:
-    """Simulate once with a new instance; as ``Plant.run``."""
+    """Simulate once with a new instance; as ``Plant.run``. ``mode``: how linear inputs are given."""
     from fmpy.fmi1 import FMICallException, FMU1Slave
 
     grid = communication_grid(time)
@@ -71,7 +72,8 @@ def run_fmi1(
             for k in range(len(grid.times)):
                 if k:
                     held = table[k - 1].copy()
-                    held[linear] = 0.5 * (table[k - 1] + table[k])[linear]
+                    if mode == "mean":
+                        held[linear] = 0.5 * (table[k - 1] + table[k])[linear]
                     _set(slave, driven, held)
                     progress[1] = grid.times[k - 1]
                     slave.doStep(float(grid.times[k - 1]), float(grid.steps[k - 1]))

@@ -79,7 +79,7 @@ class Fmi2Instance(Instance):
         self.created(handle, "Instantiate")
 
     def initialize_begin(self, start: float, stop: float, tolerance: float | None) -> None:
-        """fmi2SetupExperiment, fmi2EnterInitializationMode."""
+        """fmi2SetupExperiment, start values again, fmi2EnterInitializationMode."""
         self.call(
             "SetupExperiment",
             (ctypes.c_int, int(tolerance is not None)),
@@ -88,6 +88,7 @@ class Fmi2Instance(Instance):
             (ctypes.c_int, 1),
             (ctypes.c_double, stop),
         )
+        self.set_start_again()
         self.call("EnterInitializationMode")
 
     def value_function(self, verb: str, suffix: str) -> Any:

@@ -2,7 +2,7 @@
 
 Inputs are piecewise linear between the samples of a recording, or hold from sample to sample where
 ``Signals.held`` names them, and are constant outside of the recording. Between two communication points
-t_k and t_k+1 the FMU is given, for linear inputs, best first:
+t_k and t_k+1 the FMU is given, for linear inputs, one of
 
 ``derivative``
     FMI 2.0 with ``canInterpolateInputs``: u(t_k) and the slope (u(t_k+1) - u(t_k)) / h by
@@ -11,8 +11,11 @@ t_k and t_k+1 the FMU is given, for linear inputs, best first:
     FMI 3.0 with intermediate update and inputs that allow it: u(t) whenever the FMU asks (clause 4.2.2).
     Exact likewise.
 ``mean``
-    Otherwise: the mean (u(t_k) + u(t_k+1)) / 2, held over the step, so that the states see the input
-    without delay (second order in h; holding u(t_k) would delay by h/2).
+    The mean (u(t_k) + u(t_k+1)) / 2, held over the step, so that the states see the input
+    without delay (second order in h).
+``hold``
+    u(t_k), held over the step: delays by h/2 (first order in h), but an FMU whose own solver looks at the input
+    at both ends of its step may want just that.
 
 Held, discrete, Integer and Boolean inputs keep u(t_k) over the step. Outputs at t_k are always read with
 u(t_k) applied, so that row k of the result belongs to row k of the input also under direct feed-through.
@@ -93,14 +96,33 @@ def sampled(inputs: Signals | None, variables: Sequence[Variable], times: FloatA
     return table
 
 
-def input_mode(description: FmuDescription, linear: Sequence[Variable]) -> str:
-    """Return "derivative", "intermediate" or "mean": how linear inputs are given (see the module)."""
+MODES = ("hold", "mean", "derivative", "intermediate")
+"""Ways to give linear inputs, see above; "hold" keeps u(t_k) over the step."""
+
+
+def input_modes(description: FmuDescription, linear: Sequence[Variable]) -> tuple[str, ...]:
+    """Return the ways that an FMU offers to give the linear inputs ``linear``, in the order of ``MODES``."""
+    modes = ["hold", "mean"]
     if description.fmi_version == "2.0" and description.capabilities.get("canInterpolateInputs"):
-        return "derivative"
+        modes.append("derivative")
     if (
         description.fmi_version == "3.0"
         and description.capabilities.get("providesIntermediateUpdate")
         and all(v.intermediate_update and v.type == "Float64" for v in linear)
     ):
-        return "intermediate"
-    return "mean"
+        modes.append("intermediate")
+    return tuple(modes)
+
+
+def input_mode(description: FmuDescription, linear: Sequence[Variable]) -> str:
+    """Return the way to give linear inputs where nothing was tried: the best one for our own FMUs, else "mean".
+
+    What a foreign FMU offers beyond holding may be wrong: Dymola's Co-Simulation is off by a third of the range
+    after a kink if input derivatives are set. A trial (``batch.handling``) finds the best one.
+    """
+    return input_modes(description, linear)[-1] if is_ours(description) else "mean"
+
+
+def is_ours(description: FmuDescription) -> bool:
+    """Tell whether this toolkit has exported an FMU, so that what it offers is known to be right."""
+    return description.tool.startswith("thsa-cosim")

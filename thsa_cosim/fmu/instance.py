@@ -77,6 +77,9 @@ class Instance(ABC):
         self.library: Library = load_library(library_path(folder, description, identifier or ""))
         self.resources = folder / "resources"
         self.handle = 0
+        self.input_mode: str | None = None
+        """How linear inputs are given, see ``inputs.input_mode``; None: as trusted."""
+        self._start: tuple[Sequence[Channel], FloatArray] = (), np.empty(0)
         self.is_dead = False
         """After fmiXFatal nothing may be called any more, not even FreeInstance."""
 
@@ -162,6 +165,18 @@ class Instance(ABC):
             code = self.access(function, channel.references.ctypes.data, len(data), data.ctypes.data)
             self.check(code, f"Get{channel.suffix}")
             out[list(channel.columns)] = data
+
+    def set_start(self, channels: Sequence[Channel], values: FloatArray) -> None:
+        """Set start values of a new or reset instance.
+
+        Some tools (20-sim) overwrite them when the experiment is set up; ``initialize_begin`` sets them once more.
+        """
+        self._start = channels, values
+        self.set_values(channels, values)
+
+    def set_start_again(self) -> None:
+        """Set the start values a second time, where the FMI still allows all of them."""
+        self.set_values(*self._start)
 
     def initialize_end(self) -> None:
         """Leave Initialization Mode."""

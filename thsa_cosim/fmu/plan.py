@@ -6,7 +6,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thsa_cosim.fmu.inputs import communication_grid, input_mode, input_variables, is_linear, sampled
+from thsa_cosim.errors import ParameterError
+from thsa_cosim.fmu.inputs import (
+    communication_grid,
+    input_mode,
+    input_modes,
+    input_variables,
+    is_linear,
+    sampled,
+)
 from thsa_cosim.fmu.instance import Channel, Instance
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -26,7 +34,13 @@ class Plan:
         self.output_channels = instance.channels(output_variables)
         self.units = {v.name: v.unit or "1" for v in output_variables}
         linear = np.array([is_linear(inputs, v) for v in variables], dtype=bool)
-        self.mode = input_mode(description, [v for v, yes in zip(variables, linear, strict=True) if yes])
+        ramps = [v for v, yes in zip(variables, linear, strict=True) if yes]
+        self.mode = instance.input_mode or input_mode(description, ramps)
+        if self.mode not in input_modes(description, ramps):
+            raise ParameterError(
+                f"{description.path} cannot be given its inputs by {self.mode!r}; "
+                f"choose one of {', '.join(input_modes(description, ramps))}."
+            )
         table = sampled(inputs, variables, self.grid.times)
         self.first = table[0] if variables else np.empty(0)
         moves = (table != table[0]).any(axis=0)
@@ -38,7 +52,7 @@ class Plan:
         # With slopes given, linear inputs have arrived at u(t_k+1) by themselves.
         arrives = linear if self.mode == "derivative" else np.zeros_like(linear)
         self.end = self._rows(table, moves & ~arrives)
-        uses_slopes = self.mode != "mean" and (moves & linear).any()
+        uses_slopes = self.mode in ("derivative", "intermediate") and (moves & linear).any()
         self.smooth = self._smooth_channel(table, moves & linear) if uses_slopes else None
         self.inputs, self.input_variables, self.linear = inputs, variables, linear
         self.tables: Any = None

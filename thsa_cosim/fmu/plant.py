@@ -78,6 +78,8 @@ class Plant:
         self._instance: Instance | None = None
         self._plans: dict[Any, tuple[Any, Any]] = {}
         self._update: IntermediateUpdate | None = None
+        self.input_mode: str | None = None
+        """How linear inputs are given in Co-Simulation, one of ``inputs.MODES``; None: as trusted."""
 
     @classmethod
     def open(
@@ -170,7 +172,8 @@ class Plant:
         if self.description.fmi_version == "1.0":
             from thsa_cosim.fmu.fmi1 import run_fmi1
 
-            return run_fmi1(self.folder, self.description, values, inputs, outputs, time, self.progress)
+            mode = self.input_mode or "mean"
+            return run_fmi1(self.folder, self.description, values, inputs, outputs, time, self.progress, mode)
         try:
             result = self._run(values, inputs, outputs, time, tolerance, once)
         except BaseException:
@@ -195,6 +198,7 @@ class Plant:
             self.progress[0] = Phase.LOAD
             instance = self._new_instance()
             self._instance = instance
+        instance.input_mode = self.input_mode if self.kind == "co-simulation" else "mean"
         fresh = Plan(instance, inputs, outputs, time) if once else None
         plan = fresh or self._plan(instance, inputs, outputs, time)
         names = tuple(values)
@@ -211,7 +215,7 @@ class Plant:
             if self._update is not None:
                 self._update.block[1] = instance.handle
         self.progress[0] = Phase.INITIALIZE
-        instance.set_values(settable, np.fromiter((float(values[n]) for n in names), float, len(names)))
+        instance.set_start(settable, np.fromiter((float(values[n]) for n in names), float, len(names)))
         start, stop = float(plan.grid.times[0]), plan.grid.stop
         if self.kind == "model-exchange":
             from thsa_cosim.fmu.exchange import integrate
@@ -237,7 +241,7 @@ class Plant:
         self, instance: Instance, inputs: Signals | None, outputs: Sequence[str], time: FloatArray
     ) -> Plan:
         """Return the prepared experiment; recognised by identity, so pass the same objects again."""
-        key = ("plan", id(inputs), id(time), tuple(outputs))
+        key = ("plan", id(inputs), id(time), tuple(outputs), instance.input_mode)
         plan: Plan = self._cached(key, lambda: Plan(instance, inputs, outputs, time), keep=(inputs, time))
         return plan
 

@@ -2,6 +2,7 @@
 
 A vector of a point is simulated against each recording of that point. Cost terms are looked up in the
 journal first and written to it as they come, so that a study that is run again repeats what it knows.
+Residuals are too large to be kept: of vectors whose residuals were asked for, the journal holds the cost.
 """
 
 import time
@@ -14,8 +15,10 @@ import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Journal, JournalRow, Outcome, Runner, Status
 from thsa_cosim.costs.channels import ResidualReducer, TermsReducer
+from thsa_cosim.costs.identification import error_terms
 from thsa_cosim.identify.problem import Case, PointProblem
 from thsa_cosim.scenario import SearchSpec
+from thsa_cosim.search import LocalSettings
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.study import OnProgress, Progress
 
@@ -59,12 +62,23 @@ class Reply:
 
 
 def planned_vectors(search: SearchSpec, dimension: int) -> int:
-    """Return how many vectors a search over ``dimension`` parameters may take: its generations, and its polish.
+    """Return how many vectors a search over ``dimension`` parameters may take.
 
-    The polish is expected to take six steps with central differences.
+    Local searches are expected to agree, each after seven steps with one-sided differences; an evolution to take
+    all its generations, its polish six steps. Central differences, twice, end both.
     """
-    polish = 6 * (2 * dimension + 1) if search.polish else 0
-    return search.population * (search.generations + 1) + 2 + polish
+    end = 2 + 4 * dimension
+    if not search.polish:
+        return evolved_vectors(search) + 2
+    if search.method == "local-first":
+        settings = LocalSettings()
+        return settings.starts * (settings.hand + 7 * (dimension + 2)) + end
+    return evolved_vectors(search) + 6 * (dimension + 2) + end
+
+
+def evolved_vectors(search: SearchSpec) -> int:
+    """Return how many vectors an evolution tries at most."""
+    return search.population * (search.generations + 1)
 
 
 def terms_experiment(case: Case, error: str) -> Experiment:
@@ -88,7 +102,7 @@ class _Vector:
     point: int
     row: int
     number: int
-    """Of the evaluation at its point: by it the generations can be told from the journal."""
+    """Of the vector among those of an evolution: by it the generations can be told from the journal."""
     values: dict[str, float]
     missing: int
     outcomes: list[Outcome | None] = field(default_factory=list)
@@ -118,6 +132,7 @@ class Evaluator:
         self._channels = tuple(channels)
         self._spent: list[int] = [0] * len(points)
         self._share: list[int] = [0] * len(points)
+        self._numbers: list[int] = [0] * len(points)
         self._on_progress = on_progress
         self._best: dict[str, float] = {}
         self._generation = 0
@@ -132,11 +147,12 @@ class Evaluator:
             for row, values in enumerate(point.space.physical(request.vectors)):
                 named = dict(zip(point.space.names, values.tolist(), strict=True))
                 self.evaluations[k] += 1
+                self._numbers[k] += request.want is Want.TERMS
                 if request.want is Want.TERMS and self._recall(k, row, named, replies[position]):
                     continue
-                vector = _Vector(
-                    k, row, self.evaluations[k], named, len(point.cases), [None] * len(point.cases)
-                )
+                # What belongs to no generation is numbered below zero.
+                number = self._numbers[k] if request.want is Want.TERMS else -self.evaluations[k]
+                vector = _Vector(k, row, number, named, len(point.cases), [None] * len(point.cases))
                 for c, case in enumerate(point.cases):
                     assigned = point.space.assignments(named, case.name)
                     if request.overrides:
@@ -153,6 +169,12 @@ class Evaluator:
             self._share[k] = planned_vectors(search, point.space.dimension) * len(point.cases)
         self.planned = sum(self._share)
         self.report()
+
+    def expect_evolution(self, k: int, search: SearchSpec) -> None:
+        """Point ``k`` needs an evolution that was not planned."""
+        further = evolved_vectors(search) * len(self._points[k].cases)
+        self._share[k] += further
+        self.planned += further
 
     def note_generation(self, k: int, generation: int) -> None:
         """Point ``k`` has finished a generation."""
@@ -230,7 +252,7 @@ class Evaluator:
             if vector.missing == 0:
                 request = requests[position][1]
                 row = self._finish(vector, request, replies[position])
-                if request.want is Want.TERMS:
+                if self._is_new(request, row):
                     rows.append(row)
             if time.monotonic() - written >= WRITE_EVERY:
                 write()
@@ -253,7 +275,10 @@ class Evaluator:
                 reply.terms[row] = total
                 self._note_best(vector.point, float(np.sum(total)))
             elif request.want is Want.RESIDUALS:
-                reply.residuals[row] = np.concatenate([o.reduced for o in outcomes if o.reduced is not None])
+                residual = np.concatenate([o.reduced for o in outcomes if o.reduced is not None])
+                reply.residuals[row] = residual
+                reply.terms[row] = self._terms(vector.point, residual)
+                self._note_best(vector.point, float(np.sum(reply.terms[row])))
             else:
                 reply.signals[row] = tuple(o.signals for o in outcomes if o.signals is not None)
         else:
@@ -269,6 +294,21 @@ class Evaluator:
             status=Status.OK if failed is None else failed.status,
             reason="" if failed is None else failed.reason,
         )
+
+    def _is_new(self, request: Request, row: JournalRow) -> bool:
+        """Whether the journal lacks a row: the same vector may be asked for in several ways."""
+        if request.want is Want.SIGNALS or request.overrides:
+            return False
+        return request.want is Want.TERMS or self._journal.known(row.stage, row.values) is None
+
+    def _terms(self, k: int, residual: FloatArray) -> FloatArray:
+        """Cost terms per channel (c,) of stacked residuals."""
+        point = self._points[k]
+        total = np.zeros(len(self._channels))
+        for slices in point.groups:
+            parts = {name: residual[part] for name, part in zip(point.channel_names, slices, strict=True)}
+            total += list(error_terms(parts, point.error).values())
+        return total
 
     def _columns(self, named: Mapping[str, float]) -> tuple[float, ...]:
         """Values in the journal's order; 0 for a parameter that only other points have."""

@@ -1,6 +1,6 @@
-"""The search at one point: evolution, polish, uncertainty. Runs in a thread of its own and only asks."""
+"""The search at one point: local searches, evolution, polish, uncertainty. In a thread of its own, it only asks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,16 +11,29 @@ from thsa_cosim.identify.problem import Given, PointProblem
 from thsa_cosim.identify.results import Estimate, PointResult, ProfileCurve
 from thsa_cosim.search import (
     CHI2_95,
+    Box,
     EvolutionSettings,
     Generation,
+    LeastSquaresSettings,
+    LocalSearch,
+    LocalSettings,
+    Minimum,
     PolishSettings,
+    Residuals,
     Uncertainty,
+    agreement,
+    answer,
+    confirm,
     estimate_uncertainty,
     evolve,
+    least_squares,
     polish,
     profile,
+    same_minimum,
+    search_locally,
     with_given,
 )
+from thsa_cosim.search.strategies import SearchMethod
 from thsa_cosim.signals import FloatArray, Signals
 
 Ask = Callable[[Request], Reply]
@@ -42,14 +55,118 @@ class _HopelessError(Exception):
     """Not one vector of the first generation can be simulated."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """The best vector of a search and how it was found; ``minimum`` is None where no least squares ended there."""
+
+    best: FloatArray
+    minimum: Minimum | None
+    local: tuple[LocalSearch, ...]
+    generations: tuple[Generation, ...]
+    converged: bool
+    stopped: str
+
+
 def search_point(
     point: PointProblem,
+    method: SearchMethod,
     settings: EvolutionSettings,
     polishing: bool,
     ask: Ask,
     on_generation: Callable[[Generation], None] | None = None,
+    on_evolution: Callable[[], None] | None = None,
 ) -> PointSearch:
-    """Identify one point's parameters; ``ask`` simulates, whatever it costs."""
+    """Identify one point's parameters; ``ask`` simulates, whatever it costs.
+
+    ``on_evolution`` is called when local searches did not agree, and an evolution begins that was not planned.
+    """
+    space = point.space
+    try:
+        if method == "local-first" and polishing:
+            found = _locally_first(point, settings, ask, on_generation, on_evolution)
+        else:
+            found = _evolve(point, settings, ask, on_generation)
+    except _HopelessError as error:
+        return PointSearch(None, (), str(error))
+    best, polished = found.best, ""
+    profiles: dict[str, ProfileCurve] = {}
+    uncertainty: Uncertainty | None = None
+    if polishing:
+        settled = PolishSettings(error=point.error)
+        residuals = _residuals(ask)
+        if found.minimum is None:
+            sure = polish(residuals, best, settled)
+        else:
+            sure = answer(confirm(found.minimum, settled), residuals)
+        polished = sure.reason
+        if sure.residual is not None and sure.jacobian is not None and sure.jacobian_error is not None:
+            best = sure.best
+            uncertainty = estimate_uncertainty(
+                best,
+                sure.residual,
+                sure.jacobian,
+                sure.jacobian_error,
+                point.groups,
+                space.names,
+                point.error,
+            )
+            if point.given is not None:
+                shifts = _given_jacobian(point.given, best, sure.residual, ask)
+                uncertainty = with_given(uncertainty, sure.jacobian, shifts, point.given.covariance)
+            profiles = _profiles(point, best, sure.jacobian, uncertainty, ask)
+    return _result(point, found, best, polished, uncertainty, profiles, ask)
+
+
+def _residuals(ask: Ask) -> Residuals:
+    return lambda vectors: ask(Request(Want.RESIDUALS, vectors)).residuals
+
+
+def _start(point: PointProblem) -> FloatArray | None:
+    given = any(p.start is not None for p in point.space.parameters)
+    return point.space.start() if given else None
+
+
+def _locally_first(
+    point: PointProblem,
+    settings: EvolutionSettings,
+    ask: Ask,
+    on_generation: Callable[[Generation], None] | None,
+    on_evolution: Callable[[], None] | None,
+) -> _Found:
+    """Local searches; an evolution, polished, where they do not agree. The better of both is what was found."""
+    least = LeastSquaresSettings(error=point.error)
+    local = search_locally(
+        _residuals(ask),
+        point.space.dimension,
+        LocalSettings(seed=settings.seed, least_squares=least),
+        _start(point),
+    )
+    if local is not None and local.settled:
+        return _Found(local.minimum.x, local.minimum, local.searches, (), True, agreement(local.searches))
+    if on_evolution is not None:
+        on_evolution()
+    evolved = _evolve(point, settings, ask, on_generation)
+    if local is None:
+        return evolved
+    box = Box.unit(point.space.dimension)
+    minimum = answer(least_squares(evolved.best, box, least), _residuals(ask))
+    if minimum is not None:
+        local = local.with_minimum(minimum, point.error)
+    reached = minimum is not None and same_minimum(minimum, local.minimum, point.error)
+    stopped = (
+        f"{agreement(local.searches)}; the evolution after them found {'that' if reached else 'a worse'} minimum"
+        f" ({evolved.stopped})"
+    )
+    return _Found(local.minimum.x, local.minimum, local.searches, evolved.generations, reached, stopped)
+
+
+def _evolve(
+    point: PointProblem,
+    settings: EvolutionSettings,
+    ask: Ask,
+    on_generation: Callable[[Generation], None] | None,
+) -> _Found:
+    """Differential evolution alone."""
     last_reason = ""
     first = True
 
@@ -64,43 +181,27 @@ def search_point(
                 c for c, t in zip(point.channel_names, reply.terms.T, strict=True) if np.isinf(t).all()
             ]
             last_reason = last_reason or f"the cost of {' and '.join(endless)} is not finite"
-            raise _HopelessError
+            raise _HopelessError(f"all of the first {settings.population} simulations failed: {last_reason}")
         first = False
         return totals
 
+    evolution = evolve(
+        costs, point.space.dimension, settings, start=_start(point), on_generation=on_generation
+    )
+    return _Found(evolution.best, None, (), evolution.history, evolution.converged, evolution.reason)
+
+
+def _result(
+    point: PointProblem,
+    found: _Found,
+    best: FloatArray,
+    polished: str,
+    uncertainty: Uncertainty | None,
+    profiles: Mapping[str, ProfileCurve],
+    ask: Ask,
+) -> PointSearch:
+    """Simulate the best vector once more, for its cost terms and signals, and gather what was found."""
     space = point.space
-    start = space.start() if any(p.start is not None for p in space.parameters) else None
-    try:
-        evolution = evolve(costs, space.dimension, settings, start=start, on_generation=on_generation)
-    except _HopelessError:
-        return PointSearch(
-            None, (), f"all of the first {settings.population} simulations failed: {last_reason}"
-        )
-    best, polished = evolution.best, ""
-    profiles: dict[str, ProfileCurve] = {}
-    uncertainty: Uncertainty | None = None
-    if polishing:
-        found = polish(
-            lambda vectors: ask(Request(Want.RESIDUALS, vectors)).residuals,
-            best,
-            PolishSettings(error=point.error),
-        )
-        polished = found.reason
-        if found.residual is not None and found.jacobian is not None and found.jacobian_error is not None:
-            best = found.best
-            uncertainty = estimate_uncertainty(
-                best,
-                found.residual,
-                found.jacobian,
-                found.jacobian_error,
-                point.groups,
-                space.names,
-                point.error,
-            )
-            if point.given is not None:
-                shifts = _given_jacobian(point.given, best, found.residual, ask)
-                uncertainty = with_given(uncertainty, found.jacobian, shifts, point.given.covariance)
-            profiles = _profiles(point, best, found.jacobian, uncertainty, ask)
     final = ask(Request(Want.TERMS, best[None, :]))
     signals = ask(Request(Want.SIGNALS, best[None, :])).signals[0]
     if signals is None:
@@ -121,11 +222,12 @@ def search_point(
         terms=terms,
         also=also,
         profiles=profiles,
-        generations=evolution.history,
+        generations=found.generations,
         evaluations=0,
-        converged=evolution.converged,
-        stopped=evolution.reason,
+        converged=found.converged,
+        stopped=found.stopped,
         polished=polished,
+        local=found.local,
     )
     return PointSearch(result, signals, "")
 
@@ -145,7 +247,7 @@ def _profiles(
         # Residuals that are larger than stated, or correlated, make the same rise of the cost say less.
         threshold = CHI2_95 * max(1.0, stderr**2 / float(plain[i]))
         found = profile(
-            lambda vectors: ask(Request(Want.RESIDUALS, vectors)).residuals,
+            _residuals(ask),
             best,
             i,
             stderr,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from thsa_cosim.laws import Law
-from thsa_cosim.search import Generation
+from thsa_cosim.search import Generation, LocalSearch
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.ssv import ParameterSet
 
@@ -82,7 +82,8 @@ class PointResult:
 
     ``cost``: equation 6 at the estimate, ``also`` the same with other error functions; ``cost_per_sample`` is 1
     when only the stated noise is left. ``correlation`` (n, n) follows the order of ``parameters``. ``converged``
-    and ``stopped`` tell how the evolution ended, ``polished`` how the least-squares polish did (empty: none).
+    and ``stopped`` tell how the search ended, ``polished`` how the least-squares polish did (empty: none).
+    ``local``: the local searches, if any; ``generations``: those of the evolution, if it ran.
     """
 
     label: str
@@ -100,6 +101,7 @@ class PointResult:
     converged: bool
     stopped: str
     polished: str
+    local: tuple[LocalSearch, ...] = ()
 
 
 @dataclass(frozen=True)

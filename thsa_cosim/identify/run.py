@@ -1,5 +1,6 @@
 """The use case: scenario → searches over a runner → parameters per point → laws → result."""
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
@@ -22,6 +23,7 @@ from thsa_cosim.identify.results import (
     LawResult,
     PointResult,
 )
+from thsa_cosim.identify.silent import note_on, silent_parameters
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario
 from thsa_cosim.search import EvolutionSettings, Generation
@@ -64,13 +66,18 @@ def identify(
         try:
             experiments = _experiments(points, held_out)
             with study.open_runner(scenario.simulation, experiments) as runner:
+                search.note(runner.notes)
                 evaluator = Evaluator(runner, journal, points, names, channels, place.on_progress)
+                search.try_parameters(evaluator)
                 search.search(evaluator)
                 search.validate(runner)
             study.complete()
         except KeyboardInterrupt:
             search.interrupted = True
     return search.result()
+
+
+_log = logging.getLogger(__name__)
 
 
 class _Search:
@@ -91,6 +98,19 @@ class _Search:
         self._notes: list[str] = []
         self._evaluator: Evaluator | None = None
 
+    def note(self, notes: Sequence[str]) -> None:
+        """Take sentences for the result."""
+        self._notes += notes
+
+    def try_parameters(self, evaluator: Evaluator) -> None:
+        """Name the parameters that do nothing, before any search."""
+        silent = silent_parameters(self._points[0], lambda request: evaluator.serve([(0, request)])[0])
+        if silent:
+            sentences = note_on(silent)
+            self.note(sentences)
+            for sentence in sentences:
+                _log.warning(sentence)
+
     def search(self, evaluator: Evaluator) -> None:
         """Search all points at once; what is finished is kept whatever happens to the rest."""
         self._evaluator = evaluator
@@ -110,7 +130,13 @@ class _Search:
             def on_generation(generation: Generation) -> None:
                 evaluator.note_generation(index, generation.index)
 
-            return lambda ask: search_point(self._points[index], settings, spec.polish, ask, on_generation)
+            def on_evolution() -> None:
+                evaluator.expect_evolution(index, spec)
+
+            point = self._points[index]
+            return lambda ask: search_point(
+                point, spec.method, settings, spec.polish, ask, on_generation, on_evolution
+            )
 
         tasks = [task(index) for index in range(len(self._points))]
         with closing(interleave(tasks, evaluator.serve)) as finished:

@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,8 @@ Json = Mapping[str, Any]
 class Part:
     """A study, or one stage of a study in stages: ``result`` is None while it runs, ``journal`` if it has none.
 
-    ``about`` says what was asked (see ``identify.study.describe``); ``name`` is empty for a whole study.
+    ``asked`` is the study's identity, key by key, ``about`` what a reader of it wants to know (``study.describe``);
+    ``name`` is empty for a whole study.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Part:
     result: Json | None
     about: Json
     journal: JournalTable | None
+    asked: Json = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -64,9 +66,17 @@ class Part:
         """Vectors of a generation."""
         return self._search("population")
 
+    @property
+    def searches_locally(self) -> bool:
+        """Whether local searches come first."""
+        return self._setting("method") == "local-first"
+
     def _search(self, key: str) -> int | None:
-        value = (self.result or {}).get("settings", {}).get(key, self.about.get(key))
+        value = self._setting(key)
         return value if isinstance(value, int) else None
+
+    def _setting(self, key: str) -> object:
+        return (self.result or {}).get("settings", {}).get(key, self.about.get(key))
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +151,16 @@ def _part(name: str, kind: str, folder: Path, result: Json | None, marker: Json 
     journal = folder / JOURNAL
     about = (marker or {}).get("about", {})
     table = read_journal(journal) if journal.is_file() else None
-    return Part(name, kind, folder, result, about if isinstance(about, dict) else {}, table)
+    asked = (marker or {}).get("asked", {})
+    return Part(
+        name,
+        kind,
+        folder,
+        result,
+        about if isinstance(about, dict) else {},
+        table,
+        asked if isinstance(asked, dict) else {},
+    )
 
 
 def _json(path: Path) -> Json | None:

@@ -4,10 +4,11 @@ To add an executor: a class like ``batch.local.LocalRunner`` in ``thsa_cosim/bat
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from thsa_cosim.batch import Experiment, LocalRunner, Runner
+from thsa_cosim.scenario.handling import settle_handling
 from thsa_cosim.scenario.model import SimulationSpec
 
 OpenRunner = Callable[[SimulationSpec, Sequence[Experiment]], Runner]
@@ -35,6 +36,9 @@ class Executor:
     def open_runner(self, spec: SimulationSpec, experiments: Sequence[Experiment]) -> Runner:
         """Open the processes.
 
+        How a foreign FMU is given its inputs is settled first, by a trial where the scenario does not say it; the
+        runner's ``notes`` say what was found.
+
         Raises
         ------
         ParameterError, FmuError
@@ -42,13 +46,24 @@ class Executor:
         MissingExtraError, StudyError
             If Dask is not installed, or no scheduler answers.
         """
+        settled = settle_handling(spec, experiments)
+        chosen = [
+            replace(e, input_mode=mode) if mode is not None else e
+            for e, mode in zip(experiments, settled.modes, strict=True)
+        ]
         limits: dict[str, Any] = {
             "deadline_s": spec.deadline,
             "memory_limit_mb": spec.memory_mb,
             "reuse": spec.reuse,
-            "kind": spec.interface,
+            "kind": settled.interface,
         }
         if self.address is None:
-            return LocalRunner(experiments, workers=self.workers, **limits)
+            return _noted(LocalRunner(chosen, workers=self.workers, **limits), settled.notes)
         scheme = self.address.partition("://")[0] if "://" in self.address else ""
-        return BY_SCHEME[scheme if scheme in BY_SCHEME else ""](experiments, self.address, **limits)
+        opened = BY_SCHEME[scheme if scheme in BY_SCHEME else ""](chosen, self.address, **limits)
+        return _noted(opened, settled.notes)
+
+
+def _noted(runner: Runner, notes: Sequence[str]) -> Runner:
+    runner.notes = notes
+    return runner

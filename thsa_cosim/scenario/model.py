@@ -11,7 +11,7 @@ from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario.schema import CommonTable
-from thsa_cosim.search.strategies import Strategy
+from thsa_cosim.search.strategies import SearchMethod, Strategy
 from thsa_cosim.signals import Signals
 
 
@@ -114,8 +114,9 @@ class DiagnoseSpec:
 
 @dataclass(frozen=True)
 class SearchSpec:
-    """Differential evolution and what follows it; ``profile`` names parameters for a profile likelihood."""
+    """How parameters are searched; ``profile`` names those of which a profile likelihood is computed."""
 
+    method: SearchMethod = "local-first"
     population: int = 45
     generations: int = 30
     mutation: float = 0.16
@@ -131,6 +132,7 @@ class SimulationSpec:
     """How the FMU is run: communication ``step`` [s] (None: the samples), ``deadline`` [s], ``memory_mb``."""
 
     interface: Literal["co-simulation", "model-exchange"] | None = None
+    inputs: Literal["hold", "mean", "derivative", "intermediate"] | None = None
     tolerance: float | None = None
     step: float | None = None
     deadline: float = 60.0

@@ -12,7 +12,7 @@ from thsa_cosim.errors import did_you_mean
 from thsa_cosim.laws import FORMS
 from thsa_cosim.scenario.recording_schema import RecordingsTable, TemperatureTable
 from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order
-from thsa_cosim.search.strategies import Strategy
+from thsa_cosim.search.strategies import SearchMethod, Strategy
 
 
 class LawTable(Table):
@@ -173,10 +173,13 @@ class EvolutionTable(Table):
 
 
 class SearchTable(EvolutionTable):
-    """``[search]``: differential evolution, the article's setting by default."""
+    """``[search]``: local searches first, differential evolution where they do not agree on a minimum."""
 
+    method: SearchMethod = "local-first"
+    """``"local-first"``: least squares from spread starts; differential evolution only where they do not agree.
+    ``"differential-evolution"``: that alone, the article's way."""
     polish: bool = True
-    """Least squares from the best vector; standard errors need it."""
+    """Least squares from the best vector; standard errors need it. Without it the evolution runs alone."""
     profile: list[Name] = Field(default_factory=list)
     """Names of parameters whose profile likelihood is computed."""
 
@@ -186,6 +189,10 @@ class SimulationTable(Table):
 
     interface: Literal["co-simulation", "model-exchange"] | None = None
     """Left out: Co-Simulation if the FMU has it."""
+    inputs: Literal["hold", "mean", "derivative", "intermediate"] | None = None
+    """How inputs that run linearly reach a Co-Simulation FMU within a step: held at its begin or at its mean, by input
+    derivatives (FMI 2.0), by intermediate update (FMI 3.0). Left out: the best one in a trial on the first recording,
+    which may be Model Exchange if ``interface`` is left out too."""
     tolerance: Annotated[float, Field(gt=0, lt=1)] | None = None
     """Relative tolerance handed to the FMU (or to CVODE); left out: the FMU's own."""
     step: Positive | None = None

@@ -125,7 +125,7 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         pareto=pareto_spec(table),
         line=line_spec(table, space),
         surface=surface_spec(table, space),
-        search=SearchSpec(**table.search.model_dump(), polish=False),
+        search=SearchSpec(method="differential-evolution", **table.search.model_dump(), polish=False),
         simulation=_simulation(table),
     )
 

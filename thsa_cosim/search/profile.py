@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from thsa_cosim.search.polish import PolishSettings, Residuals, polish
+from thsa_cosim.search.differences import Residuals
+from thsa_cosim.search.polish import PolishSettings, polish
 
 FloatArray = NDArray[np.float64]
 

@@ -1,6 +1,8 @@
-"""The names of SciPy's differential-evolution strategies that a scenario may ask for."""
+"""The names that a scenario may ask for: the way to search, and SciPy's strategies of differential evolution."""
 
 from typing import Literal
+
+SearchMethod = Literal["local-first", "differential-evolution"]
 
 Strategy = Literal[
     "rand1bin",

@@ -25,6 +25,7 @@ def describe(scenario: Scenario | TuneScenario) -> dict[str, object]:
         "title": scenario.title or scenario.path.stem,
         "scenario": str(scenario.path),
         "fmu": str(scenario.fmu.path),
+        "method": scenario.search.method,
         "population": scenario.search.population,
         "generations": scenario.search.generations,
         "parameters": {p.name: p.unit for p in scenario.parameters.parameters},

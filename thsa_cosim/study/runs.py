@@ -150,6 +150,7 @@ class LoggedRunner:
 
     def __init__(self, runner: Runner, log: RunLog, experiments: Sequence[Experiment], settings: Any) -> None:
         """``settings``: what else decides how an experiment is run."""
+        self.notes = runner.notes
         self._runner = runner
         self._log = log
         archives: dict[Path, str] = {}

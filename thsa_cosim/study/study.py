@@ -49,7 +49,7 @@ class Study:
     def open_runner(self, spec: SimulationSpec, experiments: Sequence[Experiment]) -> Runner:
         """Open the processes for ``experiments``; their outcomes are kept, and looked up."""
         # Deadline and memory decide whether a run is let finish, not what it gives.
-        settings = (spec.interface, spec.reuse)
+        settings = (spec.interface, spec.inputs, spec.reuse)
         return LoggedRunner(
             self.place.executor.open_runner(spec, experiments), self._log, experiments, settings
         )

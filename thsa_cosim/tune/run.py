@@ -67,6 +67,7 @@ def tune(scenario: TuneScenario, place: Place) -> TuneResult:
         try:
             experiments = [case.experiment for case in cases_of([*groups, tuning.check])]
             with study.open_runner(scenario.simulation, experiments) as runner:
+                tuning.notes += runner.notes
                 evaluator = Evaluator(scenario, runner, journal, groups, names, place.on_progress)
                 tuning.run(evaluator, journal)
             study.complete()

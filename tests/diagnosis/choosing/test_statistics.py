@@ -10,7 +10,17 @@ from scipy import stats
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_numbers
 from thsa_cosim.diagnosis.fitting.fit import Fit
-from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, errors, structure, worst_share
+from thsa_cosim.diagnosis.fitting.structure import (
+    FEWEST,
+    block_gains,
+    block_squares,
+    consistency,
+    errors,
+    errors_by_recording,
+    relative_consistency,
+    structure,
+    worst_share,
+)
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 
 N = 3000
@@ -26,7 +36,7 @@ def proposal(fit: Fit, count: int) -> Any:
     """A candidate with ``count`` coefficients whose responses are random."""
     response = RNG.standard_normal((N, count))
     left = response - fit.jacobian @ np.linalg.lstsq(fit.jacobian, response, rcond=None)[0]
-    return SimpleNamespace(response=response, precision=left.T @ left)
+    return SimpleNamespace(response=response, precision=left.T @ left, is_testable=True)
 
 
 @pytest.mark.parametrize("coefficients", [1, 2])
@@ -86,12 +96,12 @@ def test_a_smooth_residual_is_found_at_its_size_beneath_the_noise():
 
 
 def test_gains_by_blocks_of_time_say_how_sure_a_gain_is():
-    own = trials(5000)
-    worse = RNG.standard_normal(10000)
+    own = trials(8000)
+    worse = RNG.standard_normal(16000)
     assert block_gains(own, worse, 0.5 * worse).sum() == pytest.approx(0.75 * np.sum(worse**2))
-    assert block_gains(own, worse, worse).size == 10  # of half a second each
+    assert block_gains(own, worse, worse).size == 16  # of half a second each
     assert consistency(block_gains(own, worse, 0.5 * worse)) > 10.0
-    other = RNG.standard_normal(10000)
+    other = RNG.standard_normal(16000)
     assert abs(consistency(block_gains(own, worse, other))) < 4.0
     assert consistency(np.array([3.0])) == 0.0
 
@@ -115,12 +125,58 @@ def test_share_that_is_left_is_that_of_the_worst_channel():
         return np.concatenate([v * smooth, i * smooth]) + RNG.standard_normal(40000)
 
     before = residual(10.0, 2.0)
-    assert worst_share(own, before, residual(0.0, 1.0)) == pytest.approx(0.25, rel=0.1)
-    assert worst_share(own, before, residual(5.0, 0.0)) == pytest.approx(0.25, rel=0.1)
-    assert worst_share(own, before, residual(0.0, 0.0)) < 0.02
-    assert worst_share(own, before, residual(20.0, 0.0)) == 1.0
-    # Where there was hardly any structure, a share of it says little.
-    assert worst_share(own, residual(10.0, 0.1), residual(0.0, 0.1)) < 0.1
+
+    def left(after: np.ndarray, *names: str) -> float:
+        return worst_share(own, before, after, names or ("v", "i"))
+
+    assert left(residual(0.0, 1.0)) == pytest.approx(0.25, rel=0.1)
+    assert left(residual(5.0, 0.0)) == pytest.approx(0.25, rel=0.1)
+    assert left(residual(0.0, 1.0), "v") < 0.02
+    assert left(residual(0.0, 0.0)) < 0.02
+    assert left(residual(20.0, 0.0)) == 1.0
+    assert worst_share(own, before, before, ()) == 0.0
+
+
+def test_short_recordings_are_cut_into_blocks_enough():
+    own = trials(1000, 2000)
+    squares = block_squares(own, np.ones(6000))
+    assert squares.size == FEWEST
+    np.testing.assert_allclose(squares, 500.0, rtol=0.01)
+
+
+def test_where_errors_add_up_the_fall_of_every_block_counts_and_not_the_scatter_of_the_gains():
+    """A position runs away: the last block outweighs all others; the better model stays at the noise."""
+    own = trials(3000)
+    drift = 1e3 * (np.arange(3000) * 1e-3 / 3.0) ** 4
+    worse = np.concatenate([drift, drift]) + RNG.standard_normal(6000)
+    better = RNG.standard_normal(6000)
+    before, after = block_squares(own, worse), block_squares(own, better)
+    assert (before - after).sum() > 1e5
+    assert consistency(before - after) < 3.0, "what used to be said of it"
+    assert relative_consistency(before, after) > 3.0
+    assert relative_consistency(after, before) < -3.0
+    chance = [
+        relative_consistency(block_squares(own, RNG.standard_normal(6000)), block_squares(own, better))
+        for _ in range(30)
+    ]
+    assert max(chance) < 4.0
+    assert relative_consistency(before[:2], after[:2]) == 0.0
+    assert relative_consistency(before[:3], np.zeros(3)) == 0.0
+
+
+def test_every_sample_counts_the_same_in_a_pooled_error():
+    own = [*trials(100, noise=0.1), *trials(300, noise=0.2)]
+    residual = np.concatenate([np.full(200, 2.0), np.full(600, -3.0)])
+    found = errors(own, residual)["v"]
+    assert found.rmse == pytest.approx(np.sqrt((100 * 0.2**2 + 300 * 0.6**2) / 400))
+    assert found.noise == pytest.approx(np.sqrt((100 * 0.1**2 + 300 * 0.2**2) / 400))
+    for trial, name in zip(own, "ab", strict=True):
+        trial.case.name = name
+    each = errors_by_recording(own, residual)
+    assert each["a"]["i"].rmse == pytest.approx(0.2)
+    assert each["b"]["v"].rmse == pytest.approx(0.6)
+    pooled = np.sqrt((100 * each["a"]["v"].rmse ** 2 + 300 * each["b"]["v"].rmse ** 2) / 400)
+    assert found.rmse == pytest.approx(pooled)
 
 
 def test_a_ripple_over_position_is_found_by_its_wave_number():

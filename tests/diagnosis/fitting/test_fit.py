@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from thsa_cosim.batch import Job, Outcome, Status
 from thsa_cosim.costs.channels import Channel
 from thsa_cosim.diagnosis.fitting.bench import Bench
-from thsa_cosim.diagnosis.fitting.fit import columns, refine
+from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
@@ -39,6 +40,7 @@ class Formula:
     model: Model
     fails: Callable[[Mapping[str, float]], bool] = lambda values: False
     jobs: list[Job] = field(default_factory=list)
+    notes: tuple[str, ...] = ()
 
     def run(self, jobs: Sequence[Job], on_outcome: object = None) -> list[Outcome]:
         self.jobs += jobs
@@ -199,3 +201,30 @@ def test_weights_return_to_one_with_the_right_model_and_rescale_what_they_are_co
     np.testing.assert_allclose(levels.plain(levels.base_held, "validate"), plain)
     again, _ = levels.weigh(fit)
     assert again is fit, "nothing changed, so nothing is fitted"
+
+
+def test_what_is_held_at_its_bound_does_not_keep_the_others_from_their_optimum():
+    """An amplitude that may not fall as far as it wants: rate and offset make up for it, as a bounded solver says."""
+    bounded = Unknowns((unknown("a", 2.5, lower=2.3), unknown("r", 0.4), unknown("o", 0.0)))
+    fit = refine(bench(), bounded, bounded.start, iterations=20)
+    assert fit is not None
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        return (decay({"a": x[0], "r": x[1], "o": x[2]}) - MEASURED["fit"]) / NOISE
+
+    best = least_squares(residual, bounded.start, bounds=([2.3, -10.0, -10.0], 10.0))
+    assert fit.vector[0] == 2.3
+    assert fit.misfit == pytest.approx(2.0 * best.cost, rel=1e-3)
+
+
+def test_the_drawing_is_not_widened_by_what_the_recordings_leave_unexplained():
+    """Two unknowns that only act together, one known from the drawing: the other is as sure as that."""
+    jacobian = np.ones((100, 2)) * 1e3
+    members = (unknown("J", 1.0, spread=0.01, scale=1.0), unknown("a", 0.0, scale=1.0))
+    fit = Fit(Unknowns(members), np.ones(2), np.full(100, 30.0), jacobian, np.ones(2), 0.0, True)
+    assert fit.inflation == 900.0
+    np.testing.assert_allclose(fit.stderr(fit.inflation), 0.01, rtol=0.1)
+    free = Unknowns((unknown("J", 1.0), unknown("a", 0.0), unknown("b", 0.0)))
+    none = Fit(free, np.ones(3), np.ones(100), np.ones((100, 3)) * [1e3, 1e3, 0.0], np.ones(3), 0.0, True)
+    assert np.isinf(none.stderr()).all(), "two act only together, the third not at all"
+    assert none.inflation == 1.0

@@ -4,21 +4,15 @@ Forward selection (each step against the model so far, declared parameters fitte
 effect must still be needed beside the others.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
-from thsa_cosim.diagnosis.choosing.gates import (
-    SIGMAS,
-    SMALLEST_STRUCTURE,
-    insignificant,
-    near_best,
-    objection,
-    out_of_range,
-)
-from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, go_on, polish, score
+from thsa_cosim.diagnosis.choosing.gates import SIGMAS, SMALLEST_STRUCTURE, out_of_range
+from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
+from thsa_cosim.diagnosis.choosing.selection import Say, Selection
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
 from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency
@@ -26,16 +20,7 @@ from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
 
-#: Rivals that leave less than this share of the gain unexplained cannot be told apart.
-TIE_SHARE = 0.005
-#: How many effects are refined after each screening, if they promise at least this share of the best one's gain.
-REFINED, WORTH = 6, 0.03
-#: Once an effect leaves no structure, only those that promise this share of its gain are refined as rivals; and only
-#: those that reach this share of the best gain in two iterations are refined further.
-RIVAL_WORTH = 0.3
-
 Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +100,15 @@ def attribute(
         proposals = screen(bench, current, [c for c in candidates if c.key not in taken], scan(current))
         gains = largest_gains(current, proposals, seed + number)
         limit = threshold(gains)
-        scored = _refine_best(bench, weights, current, current_held, proposals, limit, say)
-        choice, objections = _choose(bench, weights, current, current_held, scored, limit, not accepted, say)
+        selection = Selection(bench, weights, current, current_held, say)
+        scored = selection.refined(proposals, limit)
+        choice, objections = selection.choose(scored, limit, not accepted)
         factors = bench.factors("fit")
         named = {s.candidate.effect.name for s in accepted}
-        rivals = () if choice is None else _rivals(bench, choice, scored, current, current_held, named)
+        rivals: tuple[Scored, ...] = ()
+        if choice is not None:
+            scored += selection.elsewhere(choice, scored, proposals)
+            rivals = selection.rivals(choice, scored, named)
         rounds.append(
             Round(limit, tuple(proposals), tuple(scored), choice, objections, rivals, gains, factors)
         )
@@ -130,7 +119,7 @@ def attribute(
         if reweighed is None:
             return None
         current_held = reweighed
-    accepted, current, current_held, notes = _prune(bench, unknowns, weights, accepted, current, current_held)
+    accepted, current, current_held, notes = prune(bench, unknowns, weights, accepted, current, current_held)
     while accepted and (name := out_of_range(current)):
         notes.append(f"{accepted[-1].candidate.name} was dropped: it drives {name} to the end of its range")
         accepted = accepted[:-1]
@@ -151,71 +140,7 @@ def attribute(
     )
 
 
-def _choose(
-    bench: Bench,
-    weights: ChannelWeights,
-    current: Fit,
-    held: FloatArray,
-    scored: Sequence[Scored],
-    limit: float,
-    first: bool,
-    say: Say,
-) -> tuple[Scored | None, tuple[str, ...]]:
-    """The effect to accept, fitted with all parameters, if any; why each that was tried was not, "" for it."""
-    objections: list[str] = []
-    doubtful: Scored | None = None
-    for one in near_best(scored):
-        why = objection(bench, weights, held, one, limit, first)
-        if not why:
-            say(f"fitting {one.candidate.name} with all parameters")
-            one = polish(bench, one, current, held)
-            why = insignificant(one)
-            if not why and (name := out_of_range(one.fit)):
-                why = f"{one.candidate.name}: it drives the declared parameter {name} to the end of its range"
-                doubtful = doubtful or one  # another effect that is still missing may do that
-        objections.append(why)
-        if not why:
-            return one, tuple(objections)
-    return doubtful, tuple(objections)
-
-
-def _refine_best(
-    bench: Bench,
-    weights: ChannelWeights,
-    current: Fit,
-    held: FloatArray,
-    proposals: Sequence[Proposal],
-    limit: float,
-    say: Say,
-) -> list[Scored]:
-    """The best proposals of the best effects, fitted with the declared parameters, best on held-out data first."""
-    chosen: list[Proposal] = []
-    per_effect: dict[str, int] = {}
-    worth = max(limit, WORTH * proposals[0].gain) if proposals else limit
-    for proposal in proposals:
-        name = proposal.candidate.effect.name
-        if proposal.gain < worth or (name not in per_effect and len(per_effect) == REFINED):
-            continue
-        per_effect[name] = per_effect.get(name, 0) + 1
-        if per_effect[name] <= 2:
-            chosen.append(proposal)
-    scored: list[Scored] = []
-    solved = 0.0
-    for proposal in chosen:
-        if proposal.gain < RIVAL_WORTH * solved:
-            continue
-        say(f"fitting {proposal.label}")
-        result = score(bench, current, held, proposal)
-        if result is not None:
-            scored.append(result)
-            if weights.left(result.validate) < SMALLEST_STRUCTURE**2:
-                solved = max(solved, result.fit_gain, proposal.gain)
-    most = max((s.fit_gain for s in scored), default=0.0)
-    scored = [go_on(bench, s, current, held) if s.fit_gain > RIVAL_WORTH * most else s for s in scored]
-    return sorted(scored, key=lambda s: -s.held_out_gain)
-
-
-def _prune(
+def prune(
     bench: Bench,
     unknowns: Unknowns,
     weights: ChannelWeights,
@@ -245,26 +170,3 @@ def _prune(
         else:
             break
     return accepted, current, held, notes
-
-
-def _rivals(
-    bench: Bench,
-    winner: Scored,
-    scored: Sequence[Scored],
-    base: Fit,
-    held: FloatArray,
-    named: Collection[str],
-) -> tuple[Scored, ...]:
-    """Other effects than the accepted one and those ``named`` before that explain held-out recordings as well."""
-    rivals: dict[str, Scored] = {}
-    for other in scored:
-        name = other.candidate.effect.name
-        if name == winner.candidate.effect.name or name in rivals or name in named:
-            continue
-        if other.held_out_gain < 0.9 * winner.held_out_gain:
-            continue
-        polished = polish(bench, other, base, held)
-        lead = block_gains(bench.of("validate"), polished.validate, winner.validate)
-        if consistency(lead) < SIGMAS or float(lead.sum()) < TIE_SHARE * winner.held_out_gain:
-            rivals[name] = polished
-    return tuple(rivals.values())

@@ -18,7 +18,8 @@ _EULER = 0.5772156649
 
 
 def largest_gains(base: Fit, proposals: Sequence[Proposal], seed: int, draws: int = DRAWS) -> FloatArray:
-    """(draws,) the largest gain that any of the proposals has on noise alone."""
+    """(draws,) the largest gain that any of the proposals has on noise alone; what does nothing gains nothing."""
+    proposals = [p for p in proposals if p.is_testable]
     if not proposals:
         return np.zeros(draws)
     orthogonal = Orthogonal(base)

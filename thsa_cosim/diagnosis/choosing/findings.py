@@ -1,6 +1,7 @@
 """An attribution in the words of the result."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,25 +9,65 @@ from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown
 from thsa_cosim.diagnosis.results import FoundEffect, Judged, Value
 
+#: An error above this share of its value leaves it open; one above this share of the drawing's is the drawing's.
+CLEAR, NO_MORE = 1.0 / 3.0, 0.95
+#: What would not be seen at this many times its ordinary size cannot be tested.
+HUGE = 10.0
 
-def values_of(fit: Fit, *, declared: bool, inflation: float = 1.0) -> dict[str, Value]:
-    """The declared parameters (or the others) of a fit with standard errors."""
-    stderr = fit.stderr(inflation)
+
+def values_of(fit: Fit, *, declared: bool) -> dict[str, Value]:
+    """The declared parameters (or the others) of a fit with standard errors, widened by what it leaves."""
+    stderr = fit.stderr(fit.inflation)
     return {
-        u.name: Value(float(x), u.unit, float(s))
+        u.name: Value(float(x), u.unit, float(s), undetermined(u, float(x), float(s)))
         for u, x, s in zip(fit.unknowns.members, fit.vector, stderr, strict=True)
         if u.declared is declared
     }
 
 
-def found_effects(found: Attribution, fit: Fit, inflation: float) -> tuple[FoundEffect, ...]:
+def undetermined(unknown: Unknown, value: float, stderr: float) -> str:
+    """Why the recordings do not determine an unknown, or ""; how large an effect's parameter is says `vague`."""
+    if not unknown.lower < value < unknown.upper:
+        return f"it ended at the end of its range, {value:.6g} {unknown.unit}"
+    if not np.isfinite(stderr):
+        return "nothing in the recordings depends on it"
+    if unknown.declared and stderr > NO_MORE * unknown.spread:
+        return "the recordings say no more of it than the drawing"
+    return ""
+
+
+def vague(members: Sequence[Scored], values: Mapping[str, Value]) -> dict[str, Value]:
+    """``values`` by variable, with a reason for what in an effect's ``members`` is less than its error tells apart.
+
+    A coefficient counts against the largest of its unit: the sine of a ripple may well be zero beside its cosine.
+    """
+    parameters = {p.variable: p for s in members for p in s.candidate.parameters if p.variable in values}
+    sizes: dict[str, float] = {}
+    for variable, p in parameters.items():
+        if p.role == "coefficient":
+            moved = abs(values[variable].value - p.neutral)
+            sizes[p.unit] = max(sizes.get(p.unit, 0.0), moved)
+    found = {}
+    for variable, p in parameters.items():
+        one = values[variable]
+        size = sizes[p.unit] if p.role == "coefficient" else max(abs(one.value), abs(p.typical))
+        if not one.reason and one.stderr > CLEAR * size:
+            one = replace(
+                one, reason=f"it is not determined: one standard error is {one.stderr:.2g} {one.unit}"
+            )
+        found[variable] = one
+    return found
+
+
+def found_effects(found: Attribution, fit: Fit) -> tuple[FoundEffect, ...]:
     """The accepted effects with the values of the extended model; variants and places of one effect are one."""
     merged: dict[str, list[Scored]] = {}
     for scored in found.accepted:
         merged.setdefault(scored.candidate.effect.name, []).append(scored)
-    values = values_of(fit, declared=False, inflation=inflation)
+    values = values_of(fit, declared=False)
     effects = []
     for members in merged.values():
         owner = _round_of(found, members[0])
@@ -36,7 +77,7 @@ def found_effects(found: Attribution, fit: Fit, inflation: float) -> tuple[Found
             FoundEffect(
                 name=members[0].candidate.name,
                 title=members[0].candidate.effect.title,
-                parameters=_parameters(members, values),
+                parameters=_parameters(members, vague(members, values)),
                 equivalent=rivals,
                 probability=(1.0 - chance) / (1 + len(rivals)),
             )
@@ -95,11 +136,13 @@ def _judge(
         reason = "promises less than those that were refined"
     if _not_testable(proposal, one.threshold):
         decision, reason = "not testable", "too little excitation beside the declared parameters"
+        if not proposal.is_testable:
+            reason = "nothing in the fit recordings depends on it"
     if scored is not None:
         decision = "accepted" if accepted else "rival" if candidate.key in rivals else "rejected"
         reason = ""
         if decision == "rejected":
-            reason = _objection(one, scored)
+            reason = _objection(found, one, scored)
         elif decision == "rival":
             reason = "explains the held-out recordings as well, within the uncertainty"
     return Judged(
@@ -115,29 +158,41 @@ def _judge(
     )
 
 
-def _objection(one: Round, scored: Scored) -> str:
+def _objection(found: Attribution, one: Round, scored: Scored) -> str:
     """Why a refined candidate was not accepted: its own objection if it was tried, else what came before it."""
     tried = dict(zip(map(id, one.scored), one.objections, strict=False))
     if tried.get(id(scored)):
         return tried[id(scored)]
     if one.accepted is not None and one.accepted.proposal is scored.proposal:
         return "was accepted and dropped again, see the notes"
+    later = _accepted_later(found, one, scored)
+    if later:
+        return later
     return "explains the held-out recordings less well" if one.accepted else one.objections[0]
+
+
+def _accepted_later(found: Attribution, one: Round, scored: Scored) -> str:
+    """Whether a further round accepted the candidate that this one did not."""
+    for number, other in enumerate(found.rounds, start=1):
+        kept = other.accepted is not None and any(
+            s.proposal is other.accepted.proposal for s in found.accepted
+        )
+        if kept and other is not one and other.accepted.candidate.key == scored.candidate.key:  # type: ignore[union-attr]
+            return f"explains the held-out recordings less well; accepted in round {number}"
+    return ""
 
 
 def _values(proposal: Proposal, scored: Scored | None) -> Mapping[str, Value]:
     if scored is not None:
         found = values_of(scored.fit, declared=False)
         return {p.name: found[p.variable] for p in proposal.candidate.parameters if p.variable in found}
-    spread = np.sqrt(np.diag(np.linalg.pinv(proposal.precision, hermitian=True)))
     return {
         p.name: Value(p.neutral + float(a), p.unit, float(s))
-        for p, a, s in zip(proposal.candidate.coefficients, proposal.amplitudes, spread, strict=True)
+        for p, a, s in zip(proposal.candidate.coefficients, proposal.amplitudes, proposal.stderr, strict=True)
     }
 
 
 def _not_testable(proposal: Proposal, threshold: float) -> bool:
-    """Whether even a coefficient ten times as large as usual would drown in chance."""
-    spread = np.sqrt(np.diag(np.linalg.pinv(proposal.precision, hermitian=True)))
+    """Whether even a coefficient ``HUGE`` times as large as usual would drown in chance."""
     typical = np.array([p.typical for p in proposal.candidate.coefficients])
-    return bool(np.all(np.sqrt(threshold) * spread > 10.0 * np.abs(typical)))
+    return bool(np.all(np.sqrt(threshold) * proposal.stderr > HUGE * np.abs(typical)))

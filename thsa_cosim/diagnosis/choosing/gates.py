@@ -1,15 +1,18 @@
-"""The gates that an effect has to pass: held-out gain, consistency, share, significance, plausible parameters."""
+"""The gates that an effect has to pass: held-out gain, consistency, share, existence, plausible parameters.
+
+They read numbers only (`Evidence`), so that each can be tried without a simulation.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2, norm
 
 from thsa_cosim.diagnosis.choosing.score import Scored
-from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.structure import structures
 from thsa_cosim.diagnosis.fitting.trials import Trial
-from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
 
 #: An effect must be this many standard errors from nothing, and its held-out gain from chance.
@@ -25,47 +28,69 @@ SMALLEST_STRUCTURE = 0.08
 NEAR, MOST_TRIED = 0.5, 4
 
 
+@dataclass(frozen=True)
+class Evidence:
+    """What speaks for a candidate that was fitted: gains in variances of the noise, ``consistency`` in standard errors.
+
+    ``left``: mean squared structure of the held-out residuals without it, in variances of the noise. ``share``: how
+    much of that it explains; ``signal_share``: of what the declared model left in the signal that gains most.
+    """
+
+    name: str
+    fit_gain: float
+    held_out_gain: float
+    consistency: float
+    left: float
+    share: float
+    signal_share: float
+
+
+def objection(evidence: Evidence, limit: float, first: bool) -> str:
+    """Why the held-out recordings do not ask for an effect whose gain chance keeps below ``limit``, or ""."""
+    name, wanted = evidence.name, FIRST_SHARE if first else NEXT_SHARE
+    if evidence.fit_gain < limit or evidence.held_out_gain < limit:
+        return f"{name} gains no more than chance on the held-out recordings"
+    if evidence.consistency < SIGMAS:
+        return f"{name}: its held-out gain is within {SIGMAS:g} standard errors of chance"
+    if evidence.left < SMALLEST_STRUCTURE**2:
+        return "what is left is too small against the noise to be worth an effect"
+    if evidence.share < wanted:
+        return f"{name} explains {100 * evidence.share:.0f} % of what is left, less than {100 * wanted:.0f} %"
+    if evidence.signal_share < TOTAL_SHARE:
+        return f"{name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left in any signal"
+    return ""
+
+
+def signal_share(trials: Sequence[Trial], base: FloatArray, before: FloatArray, after: FloatArray) -> float:
+    """Largest share over the signals of what the declared model left (``base``) that a step explains."""
+    whole, first, last = (structures(trials, residual) for residual in (base, before, after))
+    return max((first[name] - last[name]) / max(whole[name], SMALLEST_STRUCTURE**2) for name in whole)
+
+
 def near_best(scored: Sequence[Scored]) -> list[Scored]:
     """Those that come near the best one: if that cannot be believed, one of them may take its place."""
     near = [s for s in scored[1:] if s.held_out_gain >= NEAR * scored[0].held_out_gain]
     return [*scored[:1], *near][:MOST_TRIED]
 
 
-def objection(
-    bench: Bench, weights: ChannelWeights, held: FloatArray, one: Scored, limit: float, first: bool
-) -> str:
-    """Why the held-out recordings do not ask for an effect, or ""."""
-    wanted = FIRST_SHARE if first else NEXT_SHARE
-    name = one.candidate.name
-    if one.fit_gain < limit or one.held_out_gain < limit:
-        return f"{name} gains no more than chance on the held-out recordings"
-    if one.consistency < SIGMAS:
-        return f"{name}: its held-out gain is within {SIGMAS:g} standard errors of chance"
-    if weights.left(held) < SMALLEST_STRUCTURE**2:
-        return "what is left is too small against the noise to be worth an effect"
-    if one.share < wanted:
-        return f"{name} explains {100 * one.share:.0f} % of what is left, less than {100 * wanted:.0f} %"
-    if _explained(bench.of("validate"), weights.base_held, held, one.validate) < TOTAL_SHARE:
-        return f"{name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left in any signal"
-    return ""
-
-
-def _explained(trials: Sequence[Trial], base: FloatArray, before: FloatArray, after: FloatArray) -> float:
-    """Largest share over the channels of what the declared model left (``base``) that a step explains."""
-    whole, first, last = (structures(trials, residual) for residual in (base, before, after))
-    return max((first[name] - last[name]) / max(whole[name], SMALLEST_STRUCTURE**2) for name in whole)
-
-
 def insignificant(choice: Scored) -> str:
-    """Why a fit cannot be told from a model without the effect, or ""."""
-    fit = choice.fit
-    inflation = max(1.0, fit.misfit / fit.residual.size)
-    stderr = fit.stderr(inflation)
-    coefficients = choice.candidate.coefficients
+    """Why a fit cannot be told from a model without the effect, or "".
+
+    Wald's test of all its coefficients together: one of them may well be zero. What the recordings say is widened by
+    what they leave unexplained; what the drawing says is not.
+    """
+    fit, coefficients = choice.fit, choice.candidate.coefficients
     own = fit.unknowns.index([p.variable for p in coefficients])
-    moved = np.abs(fit.vector[own] - [p.neutral for p in coefficients])
-    if np.all(moved < SIGMAS * stderr[own]):
-        return f"{choice.candidate.name}: the interval of its coefficient includes zero"
+    neutral = np.array([p.neutral for p in coefficients])
+    covariance = fit.covariance(fit.inflation)[np.ix_(own, own)]
+    known = np.isfinite(np.diag(covariance))
+    moved = ((fit.vector[own] - neutral) / fit.unknowns.scale[own])[known]
+    size = np.sqrt(np.diag(covariance)[known])
+    alike = covariance[np.ix_(known, known)] / np.outer(size, size)
+    distance = moved / size
+    statistic = float(distance @ np.linalg.pinv(alike, hermitian=True) @ distance)
+    if not known.any() or statistic < chi2.isf(2.0 * norm.sf(SIGMAS), np.count_nonzero(known)):
+        return f"{choice.candidate.name}: its coefficients cannot be told from zero"
     return ""
 
 

@@ -9,7 +9,7 @@ from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
-from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, structure
+from thsa_cosim.diagnosis.fitting.structure import block_squares, consistency, relative_consistency, structure
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
 from thsa_cosim.signals import FloatArray
 
@@ -105,15 +105,16 @@ def _scored(bench: Bench, proposal: Proposal, fit: Fit, current: Fit, held: Floa
     validate = bench.residuals(fit.unknowns, fit.vector[None, :], "validate")[0]
     if validate is None:
         return None
-    gains = block_gains(bench.of("validate"), held, validate)
-    before, after = structure(bench.of("validate"), held), structure(bench.of("validate"), validate)
+    trials = bench.of("validate")
+    worse, better = block_squares(trials, held), block_squares(trials, validate)
+    before, after = structure(trials, held), structure(trials, validate)
     return Scored(
         proposal=proposal,
         fit=fit,
         validate=validate,
         fit_gain=current.misfit - fit.misfit,
-        held_out_gain=float(gains.sum()),
-        consistency=consistency(gains),
+        held_out_gain=float((worse - better).sum()),
+        consistency=max(consistency(worse - better), relative_consistency(worse, better)),
         share=(before - after) / before if before > 0.0 else 0.0,
     )
 

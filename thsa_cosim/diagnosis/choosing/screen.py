@@ -40,6 +40,20 @@ class Proposal:
     precision: FloatArray
 
     @property
+    def stderr(self) -> FloatArray:
+        """(k,) standard errors of the amplitudes, infinite where the response says nothing."""
+        size = np.sqrt(np.diag(self.precision))
+        if not size.all():
+            return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), np.inf)
+        inverse = np.linalg.pinv(self.precision / np.outer(size, size), rcond=TESTABLE, hermitian=True)
+        return np.asarray(np.sqrt(np.diag(inverse)) / size)
+
+    @property
+    def is_testable(self) -> bool:
+        """Whether it would do anything to the fit recordings, whatever declared parameters can imitate."""
+        return bool(np.isfinite(self.response).all() and np.any(self.precision))
+
+    @property
     def label(self) -> str:
         """Candidate and shapes."""
         settings = ", ".join(f"{name} = {value:.3g}" for name, value in self.shapes.items())

@@ -108,8 +108,7 @@ class LawSearch:
 
 def law_of(found: Attribution, *, added: bool) -> EmpiricalLaw:
     """A search's accepted terms in the words of the result."""
-    inflation = max(1.0, found.final.misfit / found.final.residual.size)
-    values = values_of(found.final, declared=False, inflation=inflation)
+    values = values_of(found.final, declared=False)
     terms = tuple(
         EmpiricalTerm(scored.candidate.slot.name, LIBRARY[p.name][0], values[p.variable])
         for scored in found.accepted

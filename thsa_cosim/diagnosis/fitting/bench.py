@@ -20,6 +20,7 @@ class Bench:
         self.evaluations = 0
         self.failures: dict[str, int] = {}
         self._runner = runner
+        self.notes = tuple(runner.notes)
         self._fixed = dict(fixed or {})
         self.weights: Mapping[str, float] = {}
         """Factors of the channels' residuals, 1 where none is given."""

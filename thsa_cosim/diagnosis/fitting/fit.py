@@ -17,6 +17,8 @@ from thsa_cosim.signals import FloatArray
 #: their own norm: far from the optimum small steps see the solver's events more than the slope.
 RESPONSE, SHARE = 60.0, 0.1
 SMALLEST, LARGEST = 1e-7, 0.3
+#: Information (of unknowns each scaled to 1) below which a combination of them is not determined at all.
+DETERMINED = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +51,30 @@ class Fit:
         prior = self.unknowns.precision * self.unknowns.scale
         return np.asarray(self.jacobian.T @ self.jacobian + np.diag(prior**2))
 
+    @property
+    def inflation(self) -> float:
+        """Mean squared residual in variances of the noise, at least 1: how much less the recordings say for it."""
+        return max(1.0, self.misfit / self.residual.size)
+
+    def covariance(self, inflation: float = 1.0) -> FloatArray:
+        """(n, n) covariance, per scale; infinite on the diagonal of what nothing determines.
+
+        ``inflation`` widens what the recordings say; what the drawing says stays as it is.
+        """
+        prior = self.unknowns.precision * self.unknowns.scale
+        information = self.jacobian.T @ self.jacobian / inflation + np.diag(prior**2)
+        size = np.sqrt(np.diag(information))
+        size[size == 0.0] = 1.0
+        values, vectors = np.linalg.eigh(information / np.outer(size, size))
+        known = values > DETERMINED
+        covariance = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(size, size)
+        open_ = np.sum(vectors[:, ~known] ** 2, axis=1) > 1e-6
+        covariance[open_, open_] = np.inf
+        return np.asarray(covariance)
+
     def stderr(self, inflation: float = 1.0) -> FloatArray:
-        """(n,) standard errors in the unknowns' units; ``inflation`` multiplies the covariance."""
-        covariance = np.linalg.pinv(self.information, hermitian=True)
-        return np.asarray(np.sqrt(np.maximum(np.diag(covariance) * inflation, 0.0)) * self.unknowns.scale)
+        """(n,) standard errors in the unknowns' units, by `covariance`; infinite where nothing determines one."""
+        return np.asarray(np.sqrt(np.diag(self.covariance(inflation))) * self.unknowns.scale)
 
 
 def cost_of(unknowns: Unknowns, vector: FloatArray, residual: FloatArray) -> float:
@@ -172,10 +194,7 @@ def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, 
     diagonal[diagonal <= 0.0] = 1.0
     for _ in range(3):
         dampings = [damping * 10.0**k for k in (0, 2, 4)]
-        trials = []
-        for d in dampings:
-            factor = cho_factor(information + np.diag((d + 1e-12) * diagonal))
-            trials.append(unknowns.clip(state.vector - cho_solve(factor, gradient) * scale))
+        trials = [_bounded(state, information + np.diag((d + 1e-12) * diagonal), gradient) for d in dampings]
         step = (trials[0] - state.vector) / scale
         promised = float(-2.0 * gradient @ step - step @ information @ step)
         if promised < 1e-3:
@@ -189,3 +208,24 @@ def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, 
             return replace(state, vector=trials[best], residual=residual, cost=costs[best]), promised, damping
         damping = dampings[-1] * 100.0
     return None, promised, damping
+
+
+def _bounded(state: Fit, curvature: FloatArray, gradient: FloatArray) -> FloatArray:
+    """(n,) where the quadratic model is least; unknowns that leave their bounds stay there, the others make up for it.
+
+    Clipping alone would leave the others where they only make sense together with what was clipped.
+    """
+    unknowns = state.unknowns
+    step = np.zeros(gradient.size)
+    free = np.ones(gradient.size, dtype=bool)
+    while free.any():
+        pull = gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
+        step[free] = -cho_solve(cho_factor(curvature[np.ix_(free, free)]), pull)
+        wanted = state.vector + step * unknowns.scale
+        held = unknowns.clip(wanted)
+        left = free & (held != wanted)
+        if not left.any():
+            break
+        step[left] = ((held - state.vector) / unknowns.scale)[left]
+        free &= ~left
+    return unknowns.clip(state.vector + step * unknowns.scale)

@@ -7,14 +7,16 @@ for anything that is smooth over a sample: unlike the root mean square it does n
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.stats import rankdata
+from scipy.stats import norm, rankdata
+from scipy.stats import t as student
 
+from thsa_cosim.costs.channels import Channel
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.results import ChannelError
 from thsa_cosim.signals import FloatArray
 
-#: Structure (rms, in standard deviations of the noise) below which a share of it says little.
-HARDLY = 0.5
+#: The scatter over fewer blocks of time than this says little.
+FEWEST = 12
 
 
 def split(trials: Sequence[Trial], residual: FloatArray) -> dict[str, list[FloatArray]]:
@@ -57,53 +59,81 @@ def structure(trials: Sequence[Trial], residual: FloatArray) -> float:
     )
 
 
-def worst_share(trials: Sequence[Trial], before: FloatArray, after: FloatArray) -> float:
-    """Largest share of a channel's structure ``before`` (N,) that is left ``after`` (N,), 0 to 1.
+def worst_share(
+    trials: Sequence[Trial], before: FloatArray, after: FloatArray, names: Sequence[str]
+) -> float:
+    """Largest share of a structure ``before`` (N,) that is left ``after`` (N,) over the named channels, 0 to 1.
 
-    Channel by channel, or position, which sums up every error of speed, would hide all others; where there was hardly
-    any structure before, as a share of ``HARDLY`` squared.
+    Channel by channel, or position, which sums up every error of speed, would hide all others. 0 without channels.
     """
     first, last = structures(trials, before), structures(trials, after)
-    return float(np.clip(max(last[name] / max(first[name], HARDLY**2) for name in first), 0.0, 1.0))
+    shares = [last[n] / first[n] if first[n] > 0.0 else 1.0 for n in names]
+    return float(np.clip(max(shares, default=0.0), 0.0, 1.0))
 
 
 def errors(trials: Sequence[Trial], residual: FloatArray) -> Mapping[str, ChannelError]:
-    """Per channel the error over the recordings."""
-    noises = {c.name: [] for t in trials for c in t.case.channels}  # type: dict[str, list[float]]
+    """Per channel the error over the recordings, every sample of which counts the same."""
+    noises: dict[str, list[float]] = {}
     for trial in trials:
         for channel in trial.case.channels:
-            noises[channel.name].append(channel.noise / np.sqrt(channel.weight))
+            noises.setdefault(channel.name, []).append(float(channel.noise / np.sqrt(channel.weight)))
     found = {}
     for name, parts in split(trials, residual).items():
-        noise = float(np.sqrt(np.mean(np.square(noises[name]))))
+        sizes = np.array([part.size for part in parts])
+        noise = float(np.sqrt(np.average(np.square(noises[name]), weights=sizes)))
+        squares = sum(s**2 * float(p @ p) for s, p in zip(noises[name], parts, strict=True))
         mean, deviation = lagged(parts)
-        joined = np.concatenate(parts)
         found[name] = ChannelError(
-            rmse=float(np.sqrt(np.mean(joined**2))) * noise,
+            rmse=float(np.sqrt(squares / sizes.sum())),
             noise=noise,
             structure=float(np.sqrt(max(mean, 0.0))) * noise,
             significance=mean / deviation,
-            samples=joined.size,
+            samples=int(sizes.sum()),
         )
+    return found
+
+
+def errors_by_recording(
+    trials: Sequence[Trial], residual: FloatArray
+) -> dict[str, Mapping[str, ChannelError]]:
+    """Per recording, by its name, the error of each channel."""
+    found: dict[str, Mapping[str, ChannelError]] = {}
+    position = 0
+    for trial in trials:
+        size = sum(c.measured.size for c in trial.case.channels)
+        found[trial.case.name] = errors((trial,), residual[position : position + size])
+        position += size
     return found
 
 
 def block_gains(
     trials: Sequence[Trial], worse: FloatArray, better: FloatArray, seconds: float = 0.5
 ) -> FloatArray:
-    """Decrease of the squared residuals per block of time (b,), all channels together.
+    """Decrease of the squared residuals per block of time (b,), all channels together."""
+    return block_squares(trials, worse, seconds) - block_squares(trials, better, seconds)
 
-    Blocks are long against the correlation of the residuals, so that their scatter says what chance does.
+
+def block_squares(trials: Sequence[Trial], residual: FloatArray, seconds: float = 0.5) -> FloatArray:
+    """Sum of the squared residuals per block of time (b,), all channels together.
+
+    Blocks are long against the correlation of the residuals, so that their scatter says what chance does; shorter
+    recordings are cut into no fewer than ``FEWEST``.
     """
+    spans = [(min(c.time[0] for c in own), max(c.time[-1] for c in own)) for own in _channels(trials)]
+    seconds = min(seconds, sum(float(end - begin) for begin, end in spans) / FEWEST)
     sums: list[FloatArray] = []
-    for trial, gain in zip(trials, per_trial(trials, worse**2 - better**2), strict=True):
-        blocks = [
-            np.bincount(np.floor((c.time - c.time[0]) / seconds).astype(int), weights=gain[c.name])
-            for c in trial.case.channels
-        ]
-        longest = max(b.size for b in blocks)
-        sums.append(np.sum([np.pad(b, (0, longest - b.size)) for b in blocks], axis=0))
+    for trial, (begin, end), squares in zip(trials, spans, per_trial(trials, residual**2), strict=True):
+        count = max(1, round(float(end - begin) / seconds))
+        own = np.zeros(count)
+        for channel in trial.case.channels:
+            block = np.floor((channel.time - begin) / (end - begin) * count).astype(int)
+            np.add.at(own, np.minimum(block, count - 1), squares[channel.name])
+        sums.append(own)
     return np.concatenate(sums)
+
+
+def _channels(trials: Sequence[Trial]) -> list[Sequence[Channel]]:
+    return [trial.case.channels for trial in trials]
 
 
 def consistency(gains: FloatArray) -> float:
@@ -118,3 +148,18 @@ def consistency(gains: FloatArray) -> float:
     ranks = rankdata(np.abs(gains))
     z = float(np.sum(ranks * np.sign(gains)) / max(np.sqrt(np.sum(ranks**2)), 1e-12))
     return max(t, z)
+
+
+def relative_consistency(worse: FloatArray, better: FloatArray) -> float:
+    """How many standard errors the squared residuals of blocks (b,) fall, each as a share of its own.
+
+    Where errors add up over a recording, as in a position, the last block outweighs all others, and the scatter of the
+    gains says nothing; that of their logarithms does (Student's t, as standard deviations of a normal).
+    """
+    kept = (worse > 0.0) & (better > 0.0)
+    if np.count_nonzero(kept) < 3:
+        return 0.0
+    falls = np.log(worse[kept] / better[kept])
+    t = float(falls.mean() / max(falls.std(ddof=1) / np.sqrt(falls.size), 1e-12))
+    sigmas = float(norm.isf(student.sf(t, falls.size - 1)))
+    return min(sigmas, t)

@@ -11,6 +11,7 @@ import pandas as pd
 from thsa_cosim.diagnosis.results import ChannelError, DiagnosisResult, EmpiricalLaw, Errors, Value
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.report.files import RESULT, write_json
+from thsa_cosim.report.page.pictures import write_pictures
 from thsa_cosim.report.signal_files import write_signals
 
 
@@ -31,8 +32,8 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
             }
             for e in result.effects
         ],
-        "before": _errors(result.before),
-        "after": _errors(result.after),
+        "before": {**_errors(result.before), "recordings": _errors(result.recordings_before)},
+        "after": {**_errors(result.after), "recordings": _errors(result.recordings_after)},
         "unexplained": result.unexplained,
         "model": None if result.model is None else result.model.name,
         "fmu": None if result.extended_fmu is None else result.extended_fmu.name,
@@ -117,7 +118,7 @@ def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:
         files.append(write_signals(folder, c.part, c.name, variants))
     files += [p for p in (result.model, result.extended_fmu, result.wrapper) if p is not None]
     write_json(folder / RESULT, content)
-    return [*files, folder / RESULT]
+    return [*files, folder / RESULT, *write_pictures(folder)]
 
 
 def _law(law: EmpiricalLaw) -> dict[str, Any]:
@@ -150,7 +151,18 @@ def _force(before: ForceBalance, after: ForceBalance | None) -> dict[str, Any]:
 
 
 def _values(values: Mapping[str, Value]) -> dict[str, dict[str, Any]]:
-    return {name: {"value": v.value, "unit": v.unit, "stderr": v.stderr} for name, v in values.items()}
+    return {name: _value(v) for name, v in values.items()}
+
+
+def _value(value: Value) -> dict[str, Any]:
+    """A value; without a standard error where there is none, with a reason where it is not determined."""
+    known = {
+        "value": value.value,
+        "unit": value.unit,
+        "stderr": value.stderr if math.isfinite(value.stderr) else None,
+        "identifiable": value.identifiable,
+    }
+    return known if value.identifiable else {**known, "reason": value.reason}
 
 
 def _errors(errors: Errors) -> dict[str, dict[str, dict[str, float]]]:

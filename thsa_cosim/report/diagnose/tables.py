@@ -24,9 +24,13 @@ def sentence(content: Content) -> str:
         if ties:
             text += f" These recordings cannot tell {' and '.join(ties)}."
         return text
-    text = "Structure is left that no effect of the catalogue explains"
-    share = f" ({100 * content['unexplained']:.0f} % of the repeatable residual in the worst signal)"
-    return text + share + (f"; added all the same: {found}." if found else ".")
+    if content["verdict"] == "not-tested":
+        return "No effect could be tried on this model and these recordings: see the notes."
+    share = f"{100 * content['unexplained']:.0f} % of the repeatable residual in the worst signal"
+    if found:
+        text = f"The model lacks {found}; beside that, structure is left that no effect of the catalogue explains"
+        return f"{text} ({share})."
+    return f"Structure is left that no effect of the catalogue explains ({share})."
 
 
 def print_diagnosis(console: Console, content: Content) -> None:
@@ -39,6 +43,7 @@ def print_diagnosis(console: Console, content: Content) -> None:
         *_forces(content),
         *_faults(content),
         *empirical_law(content),
+        *_undetermined(content),
         *_alike(content),
         *_advice(content),
     ):
@@ -54,7 +59,9 @@ def _effects(content: Content) -> Table:
         table.add_column(heading, justify="right" if heading in ("value", "standard error") else "left")
     for effect in content["effects"]:
         for name, value in effect["parameters"].items():
-            error = number(value["stderr"], 2)
+            error = number(value["stderr"], 2) + (
+                "" if value.get("identifiable", True) else " (not determined)"
+            )
             table.add_row(Text(effect["name"]), name, number(value["value"]), error, value["unit"])
     return table
 
@@ -144,11 +151,28 @@ def _advice(content: Content) -> list[str]:
     return [f"To tell {' from '.join(best['rivals'])}, run {best['name']} ({best['file']})."]
 
 
+def _undetermined(content: Content) -> list[str]:
+    """Values of the model as it ends that the recordings do not determine, with why."""
+    declared = content["parameters"]["after" if content["effects"] else "before"]
+    values = [
+        (name, value) for name, value in declared.items() if value.get("reason", "").startswith("it ended")
+    ]
+    for effect in content["effects"]:
+        values += [(f"{effect['name']}: {n}", v) for n, v in effect["parameters"].items() if v.get("reason")]
+    return [f"Not determined: {name}, {value['reason']}." for name, value in values]
+
+
 def _candidates(content: Content) -> Table:
+    """What was refined in each round, and the most promising of the first."""
     table = Table(title="Candidates, the most telling first", title_justify="left")
-    for heading in ("candidate", "gain", "held-out gain", "decision", "reason"):
-        table.add_column(heading, justify="right" if "gain" in heading else "left", overflow="fold")
-    for one in [c for c in content["candidates"] if c["round"] == 1][:8]:
-        gains = number(one["fit_gain"], 3), number(one["held_out_gain"], 3)
-        table.add_row(Text(one["variant"]), *gains, one["decision"], Text(one["reason"]))
+    for heading in ("round", "candidate", "gain", "held-out gain", "decision", "reason"):
+        right = "gain" in heading or heading == "round"
+        table.add_column(heading, justify="right" if right else "left", overflow="fold")
+    rounds: dict[int, list[Mapping[str, Any]]] = {}
+    for one in content["candidates"]:
+        rounds.setdefault(one["round"], []).append(one)
+    for number_, own in rounds.items():
+        for one in own[:8] if number_ == 1 else [c for c in own if c["held_out_gain"] is not None][:4]:
+            gains = number(one["fit_gain"], 3), number(one["held_out_gain"], 3)
+            table.add_row(str(number_), Text(one["variant"]), *gains, one["decision"], Text(one["reason"]))
     return table

@@ -23,6 +23,7 @@ _VERDICTS = {
     " parameters that were tuned again.",
     "unexplained-structure": "Something repeatable is left that no effect of the catalogue explains; see on what it"
     " depends.",
+    "not-tested": "No effect could be tried on this model and these recordings.",
 }
 
 
@@ -33,7 +34,7 @@ def verdict(result: Json) -> tuple[Block, ...]:
     names = listing([_name(e) for e in effects])
     sentence = _VERDICTS.get(word, word).format(effects=names)
     if word == "unexplained-structure" and effects:
-        sentence += f" What was found all the same: {names}."
+        sentence = f"The model lacks {names}. Beside that, s" + sentence[1:]
     blocks: list[Block] = [Text(sentence, "good" if word == "no-missing-effect" else "bad")]
     if effects:
         blocks.append(_effects_table(effects))

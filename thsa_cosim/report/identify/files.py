@@ -5,23 +5,21 @@ from pathlib import Path
 
 from thsa_cosim.identify.results import IdentifyResult
 from thsa_cosim.report.files import RESULT, write_json
+from thsa_cosim.report.identify.friction import write_friction
 from thsa_cosim.report.identify.result import (
     identify_to_dict,
     write_laws_csv,
     write_parameters_csv,
 )
+from thsa_cosim.report.page.pictures import write_pictures
 from thsa_cosim.report.parameter_files import write_parameter_set
-from thsa_cosim.report.signal_files import file_name, write_signals
+from thsa_cosim.report.signal_files import write_signals
 
 
 def write_identify(
     result: IdentifyResult, folder: Path, on_file: Callable[[Path], None] | None = None
 ) -> list[Path]:
     """Write result.json, parameters.csv, laws.csv, the signals and the plots; return what was written, in order."""
-    # matplotlib takes half a second to import: not before the study has run.
-    from thsa_cosim.report.identify.friction import write_friction
-    from thsa_cosim.report.identify.plots import plot_comparison, plot_convergence, plot_law, plot_laws
-
     written: list[Path] = []
 
     def note(path: Path) -> None:
@@ -41,14 +39,6 @@ def write_identify(
     if result.parameter_set.values:
         for path in write_parameter_set(folder, result.parameter_set):
             note(path)
-    plots = folder / "plots"
-    for law in result.laws.values():
-        path = plots / f"law_{file_name(law.parameter)}.png"
-        plot_law(law, result, path)
-        note(path)
-    if len(result.laws) > 1:
-        plot_laws(result, plots / "laws.png")
-        note(plots / "laws.png")
     temperatures = [p.temperature_degC for p in result.points if p.temperature_degC is not None]
     if temperatures:
         for path in write_friction(folder, result.laws, min(temperatures), max(temperatures)):
@@ -56,9 +46,6 @@ def write_identify(
     for comparison in result.comparisons:
         both = {"measured": comparison.measured, "simulated": comparison.simulated}
         note(write_signals(folder, comparison.role, comparison.recording, both))
-        path = plots / f"{comparison.role}_{file_name(comparison.recording)}.png"
-        plot_comparison(comparison, path)
+    for path in write_pictures(folder):
         note(path)
-    plot_convergence(result, plots / "convergence.png")
-    note(plots / "convergence.png")
     return written

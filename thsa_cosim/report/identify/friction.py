@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure as Sheet
 from numpy.typing import NDArray
 
 from thsa_cosim.identify.results import LawResult
@@ -52,7 +50,7 @@ def surface(coulomb: Law, viscous: Law, speed: FloatArray, temperature: FloatArr
 def write_friction(
     folder: Path, laws: Mapping[str, LawResult], low: float, high: float, steps: int = 33
 ) -> list[Path]:
-    """Write a table and a plot per element whose two laws are known, between ``low`` and ``high`` degC."""
+    """Write a table per element whose two laws are known, between ``low`` and ``high`` degC."""
     written = []
     for element in ELEMENTS:
         if element.coulomb not in laws or element.viscous not in laws:
@@ -60,14 +58,9 @@ def write_friction(
         unit = laws[element.coulomb].unit
         speed = np.linspace(0.0, element.fastest, steps)
         temperature = np.linspace(low, high, steps)
-        friction = surface(laws[element.coulomb].law, laws[element.viscous].law, speed, temperature)
-        table, plot = (
-            folder / f"friction_{element.title}.csv",
-            folder / "plots" / f"friction_{element.title}.png",
-        )
-        _write_table(table, element, unit, speed, temperature, friction)
-        _plot(plot, element, unit, speed, temperature, friction)
-        written += [table, plot]
+        values = surface(laws[element.coulomb].law, laws[element.viscous].law, speed, temperature)
+        written.append(folder / f"friction_{element.title}.csv")
+        _write_table(written[-1], element, unit, speed, temperature, values)
     return written
 
 
@@ -80,23 +73,6 @@ def _write_table(
         for i, t in enumerate(temperature.tolist()):
             for k, v in enumerate(speed.tolist()):
                 writer.writerow([repr(t), repr(v), repr(float(friction[i, k]))])
-
-
-def _plot(
-    path: Path, element: Element, unit: str, speed: FloatArray, temperature: FloatArray, friction: FloatArray
-) -> None:
-    figure = Sheet(figsize=(7.0, 4.8), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    filled = axes.contourf(speed, temperature, friction, levels=20, cmap="viridis")
-    lines = axes.contour(speed, temperature, friction, levels=8, colors="white", linewidths=0.6)
-    axes.clabel(lines, fontsize=8, fmt="%.3g")
-    figure.colorbar(filled, ax=axes, label=f"friction [{unit}]")
-    axes.set_xlabel(f"speed [{element.unit}]")
-    axes.set_ylabel("temperature [°C]")
-    axes.set_title(f"Friction of the {element.title}: {element.coulomb} + {element.viscous} |v|", fontsize=11)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=130, format="png")
 
 
 def friction(result: Json, prefix: str = "") -> Section | None:

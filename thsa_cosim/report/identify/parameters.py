@@ -53,6 +53,24 @@ def _figure(points: list[Json], laws: Json, prefix: str) -> Figure:
     )
 
 
+def law_figures(result: Json, prefix: str = "") -> list[Figure]:
+    """Every law alone, for those who want one picture each."""
+    figures = []
+    for name, content in result.get("laws", {}).items():
+        drawn = Chart(f"{prefix}law-{name}", row_height=340)
+        own = [
+            p
+            for p in result.get("points", [])
+            if p["temperature_degC"] is not None and name in p["parameters"]
+        ]
+        _draw_law(drawn, (0, 0), name, content, own)
+        drawn.axes(x="temperature [°C]", y=f"{name} [{content['unit']}]")
+        figures.append(
+            drawn.build("Identified values with 95 % intervals, the fitted law, the published law.")
+        )
+    return figures
+
+
 def _draw_law(drawn: Chart, at: tuple[int, int], name: str, content: Json, points: list[Json]) -> None:
     law = read_law(content)
     t = np.array([p["temperature_degC"] for p in points], dtype=np.float64)

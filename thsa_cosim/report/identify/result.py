@@ -117,6 +117,7 @@ def _point(point: PointResult) -> dict[str, Any]:
         "converged": point.converged,
         "stopped": point.stopped,
         "polish": point.polished,
+        **_local(point),
         "generations": [
             {
                 "generation": generation.index,
@@ -126,6 +127,25 @@ def _point(point: PointResult) -> dict[str, Any]:
                 "evaluations": generation.evaluations,
             }
             for generation in point.generations
+        ],
+    }
+
+
+def _local(point: PointResult) -> dict[str, Any]:
+    """``local``: every local search, with its cost after each step; ``agreed`` of them ended in the best minimum."""
+    if not point.local:
+        return {}
+    return {
+        "agreed": sum(search.agrees for search in point.local),
+        "local": [
+            {
+                "start": search.start.tolist(),
+                "cost": list(search.history),
+                "evaluations": search.evaluations,
+                "agrees": search.agrees,
+                "ended": search.reason,
+            }
+            for search in point.local
         ],
     }
 

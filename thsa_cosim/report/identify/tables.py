@@ -1,12 +1,13 @@
 """What the command line prints at the end of an identification (rich)."""
 
 import math
+from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from thsa_cosim.identify.results import ForceBalance, IdentifyResult
+from thsa_cosim.identify.results import ForceBalance, IdentifyResult, PointResult
 from thsa_cosim.report.parts.text import number, percent
 from thsa_cosim.report.simulate.tables import error_cells
 
@@ -16,12 +17,25 @@ def print_identify(console: Console, result: IdentifyResult) -> None:
     if result.laws:
         console.print(laws_table(result))
     console.print(points_table(result))
+    for sentence in search_sentences(result.points):
+        console.print(Text(sentence), highlight=False)
     if any(result.errors.values()):
         console.print(errors_table(result))
     if result.force is not None:
         console.print(Text(force_sentence(result.force)), highlight=False)
     for note in result.notes:
         console.print(Text(f"note: {note}"), highlight=False)
+
+
+def search_sentences(points: Sequence[PointResult]) -> list[str]:
+    """How many local searches agreed: one sentence where it is the same at all points, else one for each kind."""
+    ended: dict[str, list[str]] = {}
+    for point in points:
+        if point.local:
+            ended.setdefault(point.stopped, []).append(point.label)
+    if len(ended) == 1 and len(points) > 1:
+        return [f"At every point {sentence}." for sentence in ended]
+    return [f"{', '.join(labels)}: {sentence}." for sentence, labels in ended.items()]
 
 
 def laws_table(result: IdentifyResult) -> Table:

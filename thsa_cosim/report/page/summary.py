@@ -15,6 +15,7 @@ from thsa_cosim.report.parts.text import (
     percent,
     plus_minus,
     quantity,
+    search_label,
     significant_cell,
     text_cell,
 )
@@ -67,6 +68,8 @@ def _question(part: Part) -> str:
     fmu = str(part.fmu.get("path") or "the FMU").replace("\\", "/").rsplit("/", 1)[-1]
     names = list(about.get("parameters", {}))
     search = f"differential evolution, {part.population} vectors, at most {part.generations} generations"
+    if part.searches_locally:
+        search = "local searches from spread starts, differential evolution where they do not agree"
     if part.kind == "identify":
         points = result.get("points", [])
         names = list(dict.fromkeys(n for p in points for n in p["parameters"])) or names
@@ -266,6 +269,7 @@ def _sure(study: Study) -> list[str]:
             sentences.append(f"{what}: a little is left that the model does not explain.")
         else:
             sentences.append(f"{what}: the model lacks something, and the errors given are then too small.")
+    sentences += _agreement(result.get("points", []))
     groups = result.get("groups", [])
     if groups:
         open_ended = [g for g in groups if not str(g["stopped"]).startswith("converged")]
@@ -276,6 +280,18 @@ def _sure(study: Study) -> list[str]:
     if done:
         sentences.append(f"{count(done, 'evaluation')}, {broken or 'none'} failed.")
     return sentences
+
+
+def _agreement(points: list[Json]) -> list[str]:
+    """How many local searches ended in the same minimum: together where all did, else by point."""
+    local = [p for p in points if p.get("local")]
+    if not local:
+        return []
+    if all(p["agreed"] == len(p["local"]) for p in local):
+        fewest = min(len(p["local"]) for p in local)
+        at = "" if len(local) == 1 else f" at each of {len(local)} points"
+        return [f"{fewest} of {fewest} local searches from different starts agree{at}."]
+    return [f"{search_label(p['label'])}: {p['stopped']}." for p in local if p["agreed"] < len(p["local"])]
 
 
 def _determined(values: list[tuple[str, Json, Json]]) -> str:

@@ -5,7 +5,7 @@ import contextlib
 import hashlib
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -57,7 +57,12 @@ def write_page(folder: Path, output: Path | None = None) -> Path:
     """
     study = read_study(folder)
     target = output or folder / PAGE
-    html = render(study, sections(study))
+    write_html(target, render(Heading(study.whole.kind, study.whole.title, study.status), sections(study)))
+    return target
+
+
+def write_html(target: Path, html: str) -> None:
+    """Write a page whole or not at all; InputError if it cannot be written."""
     partial = target.with_name(f"{target.name}.{os.getpid()}.part")
     try:
         partial.write_text(html, encoding="utf-8", errors="replace")
@@ -69,7 +74,6 @@ def write_page(folder: Path, output: Path | None = None) -> Path:
         ) from None
     finally:
         partial.unlink(missing_ok=True)
-    return target
 
 
 def sections(study: Study) -> list[Section]:
@@ -100,7 +104,16 @@ def _sections(study: Study) -> list[Section]:
     return [section for section in found if section is not None]
 
 
-def render(study: Study, shown: list[Section]) -> str:
+@dataclass(frozen=True)
+class Heading:
+    """What stands above a page: the command that made it, a title, and how far it is."""
+
+    kind: str
+    title: str
+    status: str
+
+
+def render(heading: Heading, shown: Sequence[Section]) -> str:
     """The sections as one HTML document; what comes from files is escaped by the templates."""
     environment = Environment(
         loader=PackageLoader("thsa_cosim.report.page"),
@@ -111,16 +124,21 @@ def render(study: Study, shown: list[Section]) -> str:
     )
     scripts = [_plotly(), _template("page.js")]
     return environment.get_template("page.html").render(
-        study=study,
+        heading=heading,
         sections=shown,
         groups=[list(members) for _, members in groupby(shown, key=lambda section: section.group)],
-        figures={f.name: _figure_data(f) for section in shown for f in _figures(section.blocks)},
+        figures={name: _figure_data(figure) for name, figure in figures_of(shown).items()},
         style=Markup(_template("page.css")),
         scripts=[Markup(text) for text in scripts],
         # Only these scripts may run, and nothing may be fetched: a name that slipped through could do nothing.
         script_digests=[_digest(text) for text in scripts],
         version=__version__,
     )
+
+
+def figures_of(shown: Sequence[Section]) -> dict[str, Figure]:
+    """All figures of the sections by name, in their order."""
+    return {figure.name: figure for section in shown for figure in _figures(section.blocks)}
 
 
 def _figure_data(figure: Figure) -> dict[str, object]:

@@ -18,7 +18,7 @@ from thsa_cosim.report.parts.text import (
     significant_cell,
     text_cell,
 )
-from thsa_cosim.report.signal_files import SignalFile, read_signals, signal_paths
+from thsa_cosim.report.signal_files import SignalFile, file_name, read_signals, signal_paths
 
 #: rmse over noise up to which a model counts as met, and from which it lacks something.
 MET, MISSED = 1.2, 2.0
@@ -115,7 +115,9 @@ def recording_folds(part: Part, signals: list[SignalFile]) -> list[Block]:
         temperature = known.get("temperature_degC")
         where = f", {degrees(temperature)}" if temperature is not None else ""
         role = role_text(found.role)
-        figure = compare_figure(f"{part.prefix}signals-{k}", found, known.get("error", {}))
+        figure = compare_figure(
+            f"{part.prefix}{file_name(found.role)}-{file_name(found.name)}", found, known.get("error", {})
+        )
         folds.append(Fold(f"{found.name} ({role}{where})", (figure,), is_open=k == opened))
     return folds
 

@@ -1,4 +1,4 @@
-"""The search: cost against generation with the population's spread, and how each search ended."""
+"""The search: cost against step or generation with the population's spread, and how each search ended."""
 
 import numpy as np
 
@@ -19,7 +19,10 @@ def part_evolutions(part: Part) -> list[Evolution]:
     """The populations of all searches of a part, as far as they are known."""
     if part.journal is None:
         return []
-    used = {end["label"]: max(end["generations"] - 1, 0) for end in _ends(part)}
+    ends = _ends(part)
+    if ends and not any(end["generations"] for end in ends):
+        return []  # local searches agreed, and no evolution ran
+    used = {end["label"]: max(end["generations"] - 1, 0) for end in ends}
     limit = INFEASIBLE if part.kind == "tune" else float("inf")
     return evolutions(part.journal, part.population, part.generations, used, limit)
 
@@ -28,8 +31,11 @@ def convergence(part: Part) -> Section | None:
     """The section; None for a study without a search."""
     found = part_evolutions(part)
     blocks: list[Block] = []
+    local = [p for p in (part.result or {}).get("points", []) if p.get("local")]
+    if local:
+        blocks.append(_local_figure(part, local))
     if found:
-        blocks.append(_figure(part, found))
+        blocks.append(_figure(part, found, "evolution" if local else "convergence"))
     ends = _ends(part)
     if ends:
         blocks.append(_ends_table(part, ends))
@@ -75,12 +81,38 @@ def _scales(part: Part) -> dict[str, float]:
     return {**{label: 1.0 / n for label, n in samples.items() if n}, **scales}
 
 
-def _figure(part: Part, found: list[Evolution]) -> Figure:
-    columns = min(COLUMNS, len(found))
-    rows = -(-len(found) // columns)
+def _local_figure(part: Part, points: list[Json]) -> Figure:
+    """Cost after each step of every local search, one panel per point."""
+    columns = min(COLUMNS, len(points))
+    rows = -(-len(points) // columns)
     drawn = Chart(
         f"{part.prefix}convergence", rows=rows, columns=columns, row_height=230 if rows > 1 else 290
     )
+    for k, point in enumerate(points):
+        at = divmod(k, columns)
+        scale = point["cost_per_sample"] / point["cost"] if point["cost"] else 1.0
+        for search in point["local"]:
+            cost = [value * scale for value in search["cost"]]
+            name, colour = ("agrees", chart.SIMULATED) if search["agrees"] else ("another end", chart.INK)
+            drawn.line(list(range(len(cost))), cost, name, at=at, colour=colour, width=1.2)
+        drawn.title(search_label(point["label"]), *at)
+        drawn.axes(
+            *at,
+            x="step [1]" if k + columns >= len(points) else "",
+            y="cost per sample [1]" if at[1] == 0 else "",
+            log_y=True,
+            dtick_y=1,
+            x_options={"rangemode": "tozero"},
+        )
+    return drawn.build(
+        "Cost (equation 6) per sample, 1 where only the noise is left, along local searches from different starts."
+    )
+
+
+def _figure(part: Part, found: list[Evolution], name: str) -> Figure:
+    columns = min(COLUMNS, len(found))
+    rows = -(-len(found) // columns)
+    drawn = Chart(f"{part.prefix}{name}", rows=rows, columns=columns, row_height=230 if rows > 1 else 290)
     scales = _scales(part)
     for k, evolution in enumerate(found):
         at = divmod(k, columns)
@@ -117,12 +149,12 @@ def _ends_table(part: Part, ends: list[Json]) -> Table:
     columns = [Column("search", numeric=False), Column("generations"), Column(_cost_heading(part))]
     if part.kind != "tune":
         columns += [Column("evaluations"), Column("polish ended because", numeric=False)]
-    columns.append(Column("evolution ended because", numeric=False))
+    columns.append(Column("search ended because", numeric=False))
     rows = []
     for end in ends:
         row = [
             text_cell(search_label(end["label"])),
-            number_cell(end["generations"] - 1),
+            number_cell(end["generations"] - 1) if end["generations"] else text_cell("–"),
             number_cell(end["cost"]),
         ]
         if part.kind != "tune":

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from thsa_cosim.report.page.pictures import write_pictures
 from thsa_cosim.report.signal_files import write_signals
 from thsa_cosim.simulate import SimulateResult
 
@@ -14,4 +15,4 @@ def write_simulate(result: SimulateResult, folder: Path) -> list[Path]:
             simulated = recording.simulated.select(recording.measured.names)
             both = {"measured": recording.measured, "simulated": simulated}
             written.append(write_signals(folder, recording.role, recording.name, both))
-    return written
+    return [*written, *write_pictures(folder)]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from thsa_cosim.report.files import RESULT, write_json
+from thsa_cosim.report.page.pictures import write_pictures
 from thsa_cosim.report.signal_files import write_signals
 from thsa_cosim.report.tune.result import tune_to_dict, write_check_csv, write_pareto_csv
 from thsa_cosim.report.tune.schedule_files import write_schedule
@@ -13,9 +14,6 @@ from thsa_cosim.tune import TuneResult
 
 def write_tune(result: TuneResult, folder: Path, on_file: Callable[[Path], None] | None = None) -> list[Path]:
     """Write result.json, tables, schedule and plots; return what was written, in order."""
-    # matplotlib takes half a second to import: not before the study has run.
-    from thsa_cosim.report.tune import plots as tune_plots
-
     written: list[Path] = []
 
     def note(path: Path) -> None:
@@ -25,34 +23,19 @@ def write_tune(result: TuneResult, folder: Path, on_file: Callable[[Path], None]
 
     write_json(folder / RESULT, tune_to_dict(result))
     note(folder / RESULT)
-    plots = folder / "plots"
     for path in write_responses(result, folder):
         note(path)
-    if result.after is not None:
-        tune_plots.plot_responses(result, plots / "responses.png")
-        note(plots / "responses.png")
-    if result.groups:
-        tune_plots.plot_convergence(result.groups, plots / "convergence.png")
-        note(plots / "convergence.png")
-    if result.surface is not None:
-        tune_plots.plot_surface(result.surface, result, plots / "surface.png")
-        note(plots / "surface.png")
     if result.pareto is not None and result.pareto.x.size:
         write_pareto_csv(folder / "pareto.csv", result, result.pareto)
         note(folder / "pareto.csv")
-        tune_plots.plot_pareto(result.pareto, result, plots / "pareto.png")
-        note(plots / "pareto.png")
     if result.schedule is not None:
         for path in write_schedule(folder, result.schedule.schedule, result.scenario.title):
             note(path)
-        tune_plots.plot_schedule(result.schedule, result, plots / "schedule.png")
-        note(plots / "schedule.png")
         if result.schedule.check is not None:
             write_check_csv(folder / "schedule_check.csv", result, result.schedule)
             note(folder / "schedule_check.csv")
-            if result.scenario.requirements:
-                tune_plots.plot_check(result.schedule, result, plots / "schedule_check.png")
-                note(plots / "schedule_check.png")
+    for path in write_pictures(folder):
+        note(path)
     return written
 
 

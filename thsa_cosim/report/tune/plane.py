@@ -27,7 +27,7 @@ def plane(part: Part) -> Section | None:
     if len(names) != 2 or not found:
         return None
     units = result.get("units") or part.about.get("parameters", {})
-    drawn = Chart(f"{part.prefix}plane", row_height=520)
+    drawn = Chart(f"{part.prefix}surface", row_height=520)
     logarithmic = [_is_log(surface, found[0], k, name) for k, name in enumerate(names)]
     if surface:
         _draw_surface(drawn, surface)

@@ -6,7 +6,7 @@ from thsa_cosim.report.folder import Part
 from thsa_cosim.report.parts import chart
 from thsa_cosim.report.parts.chart import Chart
 from thsa_cosim.report.parts.content import Block, Figure, Fold, Section
-from thsa_cosim.report.signal_files import SignalFile, read_signals, signal_paths
+from thsa_cosim.report.signal_files import SignalFile, file_name, read_signals, signal_paths
 
 COMMAND = "command"
 
@@ -18,7 +18,7 @@ def responses(part: Part) -> Section | None:
         return None
     folds: list[Block] = []
     for k, one in enumerate(found):
-        figure = _figure(f"{part.prefix}response-{k}", one)
+        figure = _figure(f"{part.prefix}response-{file_name(one.name)}", one)
         folds.append(Fold(one.name, (figure,), is_open=k in (0, len(found) - 1)))
     return Section(f"{part.prefix}responses", "Responses", tuple(folds))
 

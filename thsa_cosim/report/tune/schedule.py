@@ -84,7 +84,7 @@ def _check_figure(part: Part, result: Json, axis: str) -> Figure:
     wanted: list[Json] = result.get("requirements", [])
     columns = min(3, max(len(wanted), 1))
     rows = max(-(-len(wanted) // columns), 1)
-    drawn = Chart(f"{part.prefix}sweep", rows=rows, columns=columns, row_height=190)
+    drawn = Chart(f"{part.prefix}schedule-check", rows=rows, columns=columns, row_height=190)
     name, unit = _axis(axis)
     colours = set_colours(sets)
     for k, requirement in enumerate(wanted):

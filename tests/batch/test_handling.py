@@ -1,0 +1,70 @@
+"""How inputs reach an FMU: what is right is found by trial, not believed."""
+
+import numpy as np
+import pytest
+from fmu_sources import build
+
+from tests.fmu.test_plant import lag
+from thsa_cosim.batch import Experiment, Job, LocalRunner
+from thsa_cosim.batch.handling import largest_change, try_input_handling
+from thsa_cosim.errors import ParameterError
+from thsa_cosim.fmu import Plant
+from thsa_cosim.scenario.handling import settle_handling
+from thsa_cosim.scenario.model import SimulationSpec
+from thsa_cosim.signals import Signals
+
+TIME = np.linspace(0.0, 1.0, 201)
+KINKS = np.interp(TIME, [0.0, 0.2, 0.4, 0.7, 1.0], [0.0, 1.0, 1.0, -0.5, 0.2])
+
+
+def experiment(*defines: str, tool: str = "vendor") -> Experiment:
+    return Experiment("x", build.lag2(*defines, tool=tool), Signals(TIME, {"u": KINKS}), ("y",), TIME)
+
+
+@pytest.mark.parametrize("kind", ["co-simulation", "model-exchange"])
+def test_start_values_survive_a_tool_that_resets_them_in_setup(kind: str) -> None:
+    with Plant.open(build.lag2("RESET_IN_SETUP"), kind=kind) as plant:  # type: ignore[arg-type]
+        found = plant.run({"tau": 0.3}, Signals(TIME, {"u": KINKS}), ["y"], TIME, tolerance=1e-9)["y"]
+    assert np.max(np.abs(found - lag(TIME, KINKS, 0.3, 1.0))) < 1e-6
+
+
+def test_derivatives_that_are_declared_but_wrong_are_not_used() -> None:
+    """Exact where they are right; 0.3 of the signal off after each kink where they are wrong."""
+    right, wrong = try_input_handling(experiment()), try_input_handling(experiment("WRONG_SLOPE"))
+    assert right.best is not None
+    assert wrong.best is not None
+    assert right.best.mode == "derivative"
+    assert wrong.best.mode == "mean"
+    errors = {way.mode: way.error for way in wrong.ways}
+    assert errors["derivative"] > 0.3
+    assert errors["mean"] < 2e-3 < errors["hold"]
+    assert "against Model Exchange" in wrong.sentence()
+    assert f"{errors['derivative']:.1e}" in wrong.sentence()
+
+
+def test_a_foreign_fmu_is_tried_ours_is_trusted_and_a_key_fixes_it() -> None:
+    foreign, ours = experiment("WRONG_SLOPE"), experiment(tool="thsa-cosim tests")
+    assert settle_handling(SimulationSpec(), [ours]).modes == (None,)
+    settled = settle_handling(SimulationSpec(), [foreign, foreign])
+    assert settled.modes == ("mean", "mean")
+    assert "WARNING" not in settled.notes[0]
+    fixed = settle_handling(SimulationSpec(inputs="derivative"), [foreign])
+    assert fixed.modes == ("derivative",)
+    assert "WARNING: y of this Co-Simulation is" in fixed.notes[0]
+    with LocalRunner([foreign], backend="python") as runner:
+        assert runner.run([Job("x")])[0].ok
+
+
+def test_a_way_that_the_fmu_does_not_offer_is_refused() -> None:
+    with Plant.open(build.lag2(interpolates=False)) as plant:
+        plant.input_mode = "derivative"
+        with pytest.raises(ParameterError, match="choose one of hold, mean"):
+            plant.run({}, Signals(TIME, {"u": KINKS}), ["y"], TIME)
+
+
+def test_a_signal_that_is_zero_but_for_rounding_is_no_alarm() -> None:
+    base = {"a": np.sin(TIME), "b": 1e-14 * np.cos(50.0 * TIME), "c": 5.0 + 1e-13 * np.sin(TIME)}
+    found = {"a": base["a"] + 1e-5, "b": -base["b"], "c": base["c"][::-1]}
+    change, worst = largest_change(base, found)
+    assert worst == "a"
+    assert change == pytest.approx(1e-5 / np.ptp(base["a"]))

@@ -1,0 +1,165 @@
+"""The whole decision on a drive in closed form: proposals in; accepted effects, objections, rivals, pruning out."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from diagnosis.analytic import bench, candidates, unknowns
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute, prune
+from thsa_cosim.diagnosis.choosing.findings import found_effects, judged
+from thsa_cosim.diagnosis.choosing.gates import out_of_range
+from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, score
+from thsa_cosim.diagnosis.choosing.screen import screen
+from thsa_cosim.diagnosis.fitting.fit import refine
+from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
+
+NAMES = ("windage", "stribeck", "asymmetric-friction", "load-dependent-friction", "cogging")
+WINDAGE = {"motorEffect.windage.b_q": 6e-4}
+STRIBECK = {"motorEffect.stribeck.dF": 0.5, "motorEffect.stribeck.v_S": 2.0, "motorEffect.stribeck.n": 1.5}
+
+
+def diagnosed(
+    true: Mapping[str, float], *names: str, most: int = 3, **declared: Mapping[str, float]
+) -> Attribution:
+    offered = candidates(*(names or NAMES))
+    own = bench(offered, true)
+    found = attribute(own, unknowns(**declared), offered, lambda _: {}, seed=1, most=most)
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def windage() -> Attribution:
+    return diagnosed(WINDAGE)
+
+
+def test_the_effect_that_is_there_is_accepted_with_its_value(windage: Attribution):
+    assert [s.candidate.effect.name for s in windage.accepted] == ["windage"]
+    (effect,) = found_effects(windage, windage.final)
+    value = effect.parameters["b_q"]
+    assert effect.name == "windage:motor"
+    assert value.value == pytest.approx(6e-4, rel=0.02)
+    assert value.stderr < 0.02 * value.value
+    assert value.identifiable
+    assert windage.rounds[0].objections == ("",)
+    assert len(windage.rounds) == 1, "what is left is noise, so nothing more is looked for"
+    np.testing.assert_allclose(np.mean(windage.final_validate**2), 1.0, atol=0.1)
+
+
+@pytest.fixture(scope="module")
+def stribeck() -> Attribution:
+    return diagnosed(STRIBECK)
+
+
+def test_places_behind_a_rigid_gear_are_one_law_and_said_to_be(stribeck: Attribution):
+    (effect,) = found_effects(stribeck, stribeck.final)
+    assert {effect.name, *effect.equivalent} == {"stribeck:motor", "stribeck:gear"}
+    chance = stribeck.rounds[0].probability(stribeck.accepted[0].fit_gain)
+    assert effect.probability == pytest.approx((1.0 - chance) / 2.0)
+    decisions = {j.name: j.decision for j in judged(stribeck) if j.name.startswith("stribeck")}
+    assert sorted(decisions.values()) == ["accepted", "rival"]
+
+
+def test_a_drive_that_lacks_nothing_gets_nothing():
+    found = diagnosed({})
+    assert found.accepted == ()
+    assert found.final is found.base
+    assert len(found.rounds) == 1
+    assert found.rounds[0].rivals == ()
+    assert {j.decision for j in judged(found)} <= {"not refined", "rejected"}
+    assert all(found.rounds[0].objections), "whatever was refined was refused with a reason"
+
+
+def test_two_effects_are_found_one_after_the_other():
+    both = {**STRIBECK, "motorEffect.windage.b_q": 2e-3}
+    found = diagnosed(both)
+    assert {s.candidate.effect.name for s in found.accepted} == {"windage", "stribeck"}
+    assert len(found.rounds) == 2
+    assert diagnosed(both, most=1).accepted[1:] == ()
+
+
+def test_a_second_effect_that_may_be_the_misfit_of_the_first_one_is_refused():
+    found = diagnosed({**WINDAGE, **STRIBECK})
+    assert [s.candidate.effect.name for s in found.accepted] == ["stribeck"]
+    (why,) = found.rounds[1].objections
+    assert why == "windage:motor explains less than 10 % of what the declared model left in any signal"
+
+
+def test_a_candidate_whose_response_is_exactly_zero_is_not_testable():
+    """A coefficient that nothing depends on: friction in proportion to a load that is never there."""
+    offered = candidates("windage", "load-dependent-friction")
+    own = bench(offered, WINDAGE)
+    real = own._runner.run  # type: ignore[attr-defined]
+
+    def deaf(jobs, on_outcome=None):  # type: ignore[no-untyped-def]
+        kept = [
+            type(j)(j.experiment, {k: v for k, v in j.values.items() if "loadDependentFriction" not in k})
+            for j in jobs
+        ]
+        return real(kept)
+
+    own._runner.run = deaf  # type: ignore[attr-defined, method-assign]
+    found = attribute(own, unknowns(), offered, lambda _: {}, seed=1)
+    assert found is not None
+    assert [s.candidate.effect.name for s in found.accepted] == ["windage"]
+    untestable = {j.name: j.reason for j in judged(found) if j.decision == "not testable"}
+    assert set(untestable) == {"load-dependent-friction:motor", "load-dependent-friction:gear"}
+    assert set(untestable.values()) == {"nothing in the fit recordings depends on it"}
+
+
+def test_an_effect_that_drives_a_declared_parameter_to_its_end_is_dropped():
+    """The drawing's range leaves out the friction that the machine has: only its end comes near."""
+    found = diagnosed(WINDAGE, "windage", c={"start": 0.5, "lower": 0.45, "spread": np.inf})
+    assert out_of_range(found.rounds[0].scored[0].fit) == "c"
+    assert any(
+        "drives the declared parameter c to the end of its range" in o for o in found.rounds[0].objections
+    )
+    assert found.accepted == ()
+    assert any("was dropped: it drives c to the end of its range" in note for note in found.notes)
+    assert found.final is found.base
+
+
+def accepted_by_hand(true: Mapping[str, float], *names: str) -> tuple:
+    """A bench with the ``true`` effects, and the best proposal of each of ``names`` taken for accepted in turn."""
+    offered = candidates(*NAMES)
+    own, declared = bench(offered, true), unknowns()
+    base = refine(own, declared, declared.start, iterations=10)
+    assert base is not None
+    weights = ChannelWeights(own)
+    base, held = weights.weigh(base)
+    assert held is not None
+    weights.base_held = held
+    accepted: list[Scored] = []
+    current = base
+    for name in names:
+        proposals = [p for p in screen(own, current, offered, {}) if p.candidate.name == name]
+        one = score(own, current, held, proposals[0], iterations=6)
+        assert one is not None
+        accepted.append(one)
+        current = one.fit
+    wider = extended_unknowns(declared, accepted)
+    final = refine(own, wider, current.at(wider.names), iterations=8)
+    assert final is not None
+    held = own.residuals(wider, final.vector[None, :], "validate")[0]
+    return own, declared, weights, accepted, final, held
+
+
+def test_an_earlier_effect_that_a_later_one_makes_needless_is_dropped():
+    own, declared, weights, accepted, final, held = accepted_by_hand(
+        STRIBECK, "windage:motor", "stribeck:motor"
+    )
+    kept, fit, _, notes = prune(own, declared, weights, accepted, final, held)
+    assert [s.candidate.name for s in kept] == ["stribeck:motor"]
+    assert "motorEffect.windage.b_q" not in fit.unknowns.names
+    assert notes == ["windage:motor was dropped: the effects found after it explain the same"]
+
+
+def test_effects_that_are_both_needed_stay():
+    own, declared, weights, accepted, final, held = accepted_by_hand(
+        {**WINDAGE, **STRIBECK}, "windage:motor", "stribeck:motor"
+    )
+    kept, fit, _, notes = prune(own, declared, weights, accepted, final, held)
+    assert kept == accepted
+    assert fit is final
+    assert notes == []

@@ -1,0 +1,220 @@
+"""An attribution in the words of the result: decisions, reasons, probabilities, and what is not determined."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thsa_cosim.diagnosis.choosing.attribution import Round
+from thsa_cosim.diagnosis.choosing.chance import probability
+from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, undetermined, vague, values_of
+from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.fitting.fit import Fit
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
+from thsa_cosim.diagnosis.results import Value
+
+GAINS = np.random.default_rng(3).gumbel(5.0, 1.5, 1000)
+
+
+def parameter(variable: str, role: str = "coefficient", **more: Any) -> Any:
+    given = {"unit": "N", "typical": 1.0, "neutral": 0.0, "name": variable.rpartition(".")[2]} | more
+    return SimpleNamespace(variable=variable, role=role, **given)
+
+
+def proposal(
+    effect: str, gain: float, place: str = "motor", information: float = 1.0, start: float = 0.0
+) -> Any:
+    own = parameter(f"{place}.{effect}.k")
+    candidate: Any = SimpleNamespace(
+        effect=SimpleNamespace(name=effect, title=f"Title of {effect}"),
+        name=f"{effect}:{place}",
+        key=f"{effect}:{place}/x0",
+        component=effect,
+        slot=SimpleNamespace(name=place),
+        parameters=(own,),
+        coefficients=(own,),
+    )
+    response = np.full((10, 1), np.sqrt(information / 10.0))
+    return Proposal(candidate, {"v_S": start}, response, gain, np.array([2.0]), 1.0, response.T @ response)
+
+
+def unknown(name: str, **more: Any) -> Unknown:
+    given = {
+        "start": 0.0,
+        "spread": np.inf,
+        "scale": 1.0,
+        "lower": -9.0,
+        "upper": 9.0,
+        "declared": False,
+    } | more
+    return Unknown(name, name, "N", **given)
+
+
+def scored(own: Proposal, held_out: float = 90.0) -> Any:
+    unknowns = Unknowns(
+        (unknown("p", declared=True, start=1.0), unknown(own.candidate.parameters[0].variable))
+    )
+    fit = Fit(unknowns, np.array([1.0, 4.0]), np.ones(50), np.eye(50, 2), np.ones(2), 0.0, True)
+    return SimpleNamespace(
+        proposal=own, candidate=own.candidate, fit=fit, fit_gain=own.gain, held_out_gain=held_out
+    )
+
+
+def one_round(
+    proposals: list[Any], refined: list[Any], accepted: Any, objections: tuple, rivals: tuple = ()
+) -> Round:
+    return Round(17.0, tuple(proposals), tuple(refined), accepted, objections, rivals, GAINS, np.ones(1))
+
+
+def attribution(*rounds: Round, accepted: tuple = ()) -> Any:
+    return SimpleNamespace(rounds=rounds, accepted=accepted)
+
+
+@pytest.fixture
+def found() -> Any:
+    winner, rival, worse = proposal("a", 100.0), proposal("b", 95.0), proposal("c", 60.0)
+    less, chance = proposal("d", 18.0), proposal("e", 3.0)
+    blind, deaf = proposal("f", 2.0, information=0.01), proposal("g", 0.0, information=0.0)
+    refined = [scored(winner), scored(rival), scored(worse)]
+    own = one_round(
+        [winner, rival, worse, proposal("a", 50.0, start=1.0), less, chance, blind, deaf],
+        refined, refined[0], ("",), (refined[1],),
+    )  # fmt: skip
+    return attribution(own, accepted=(refined[0],))
+
+
+def test_every_candidate_is_judged_once_the_accepted_one_first_then_what_was_refined(found: Any):
+    made = judged(found)
+    assert [j.name[0] for j in made] == list("abcdefg")
+    assert [j.decision for j in made] == [
+        "accepted", "rival", "rejected", "not refined", "not refined", "not testable", "not testable",
+    ]  # fmt: skip
+    assert [j.reason for j in made] == [
+        "",
+        "explains the held-out recordings as well, within the uncertainty",
+        "explains the held-out recordings less well",
+        "promises less than those that were refined",
+        "promises no more than chance",
+        "too little excitation beside the declared parameters",
+        "nothing in the fit recordings depends on it",
+    ]
+    assert {j.round for j in made} == {1}
+    assert [j.held_out_gain for j in made] == [90.0, 90.0, 90.0, None, None, None, None]
+    assert made[0].variant == "a:motor/x0 (v_S = 0)"
+
+
+def test_a_candidate_is_not_testable_if_ten_times_its_ordinary_size_would_drown_in_chance():
+    limit = 17.0 / 100.0  # of its information: sqrt(17/information) against 10
+    for information, decision in ((1.01 * limit, "not refined"), (0.99 * limit, "not testable")):
+        own = one_round([proposal("a", 1.0, information=information)], [], None, ())
+        assert judged(attribution(own))[0].decision == decision
+
+
+def test_gains_and_values_are_those_of_the_fit_where_there_is_one_else_what_was_promised(found: Any):
+    made = {j.name[0]: j for j in judged(found)}
+    assert made["a"].parameters["k"].value == 4.0
+    assert made["d"].parameters["k"].value == 2.0
+    assert made["d"].parameters["k"].stderr == pytest.approx(1.0)
+    assert made["e"].p_value == pytest.approx(probability(3.0, GAINS))
+    assert 0.5 < made["e"].p_value < 1.0
+    assert made["a"].p_value < 1e-9
+    assert made["a"].fit_gain == 100.0
+
+
+def test_a_refusal_is_said_in_the_words_of_its_gate():
+    first, second, third = proposal("a", 90.0), proposal("b", 80.0), proposal("c", 70.0)
+    refined = [scored(p) for p in (first, second, third)]
+    own = one_round([first, second, third], refined, None, ("a is chance", "b is chance"))
+    made = judged(attribution(own))
+    assert [j.reason for j in made] == ["a is chance", "b is chance", "a is chance"]
+    assert {j.decision for j in made} == {"rejected"}
+
+
+def test_what_was_accepted_and_dropped_again_or_accepted_later_is_said_to_be():
+    first, second = proposal("a", 90.0), proposal("b", 80.0)
+    one, two = scored(first), scored(second)
+    own = one_round([first, second], [one, two], one, ("",), (two,))
+    dropped = judged(attribution(own))
+    assert dropped[0].decision == "rejected"
+    assert dropped[0].reason == "was accepted and dropped again, see the notes"
+    assert dropped[1].decision == "rejected", "a rival of what was dropped is none"
+
+    again = scored(proposal("b", 60.0))
+    later = one_round([again.proposal], [again], again, ("",))
+    both = judged(attribution(own, later, accepted=(one, again)))
+    assert [(j.name[0], j.round, j.decision) for j in both if j.round == 2] == [("b", 2, "accepted")]
+    plain = one_round([first, second], [one, two], one, ("",))
+    made = {(j.name[0], j.round): j for j in judged(attribution(plain, later, accepted=(one, again)))}
+    assert made["b", 1].reason == "explains the held-out recordings less well; accepted in round 2"
+
+
+def test_an_effect_is_as_probable_as_chance_and_its_rivals_leave_it(found: Any):
+    (effect,) = found_effects(found, found.accepted[0].fit)
+    assert (effect.name, effect.title, effect.equivalent) == ("a:motor", "Title of a", ("b:motor",))
+    assert effect.probability == pytest.approx(0.5)
+    assert effect.parameters["k"].value == 4.0
+    weak = scored(replace(found.accepted[0].proposal, gain=8.0))
+    alone = attribution(one_round([weak.proposal], [weak], weak, ("",)), accepted=(weak,))
+    (effect,) = found_effects(alone, weak.fit)
+    assert effect.probability == pytest.approx(1.0 - probability(8.0, GAINS))
+    assert 0.5 < effect.probability < 0.95
+
+
+def test_ways_of_one_effect_are_one_with_its_places_spelt_out():
+    members = [scored(proposal("a", 90.0)), scored(proposal("a", 80.0, "gear")), scored(proposal("b", 70.0))]
+    rounds = [one_round([m.proposal], [m], m, ("",)) for m in members]
+    unknowns = Unknowns(tuple(unknown(m.candidate.parameters[0].variable) for m in members))
+    fit = Fit(unknowns, np.array([1.0, 2.0, 3.0]), np.ones(50), np.eye(50, 3) * 9, np.ones(3), 0.0, True)
+    effects = found_effects(attribution(*rounds, accepted=tuple(members)), fit)
+    assert [e.name for e in effects] == ["a:motor", "b:motor"]
+    assert {n: v.value for n, v in effects[0].parameters.items()} == {"motor.a.k": 1.0, "gear.a.k": 2.0}
+    assert {n: v.value for n, v in effects[1].parameters.items()} == {"k": 3.0}
+
+
+def test_values_are_widened_by_what_is_left_and_split_into_declared_and_effects():
+    fit = scored(proposal("a", 1.0)).fit
+    wide = replace(fit, residual=np.full(50, 2.0))
+    assert values_of(fit, declared=True)["p"].stderr == pytest.approx(1.0)
+    assert values_of(wide, declared=True)["p"].stderr == pytest.approx(2.0)
+    assert list(values_of(fit, declared=False)) == ["motor.a.k"]
+
+
+def test_a_value_at_its_bound_unseen_or_only_known_from_the_drawing_is_not_determined():
+    own = unknown("p", declared=True, spread=0.5, upper=2.0)
+    assert undetermined(own, 1.0, 0.1) == ""
+    assert undetermined(own, 2.0, 7e-7) == "it ended at the end of its range, 2 N"
+    assert undetermined(own, -9.0, 7e-7) == "it ended at the end of its range, -9 N"
+    assert undetermined(own, 1.0, np.inf) == "nothing in the recordings depends on it"
+    assert undetermined(own, 1.0, 0.47) == ""
+    assert undetermined(own, 1.0, 0.48) == "the recordings say no more of it than the drawing"
+    assert undetermined(unknown("k"), 1.0, 42.0) == "", "an effect's own: see vague"
+
+
+def test_a_coefficient_of_an_effect_that_its_error_covers_is_not_determined():
+    friction = parameter("dF")
+    members: Any = [SimpleNamespace(candidate=SimpleNamespace(parameters=(friction,)))]
+    one = vague(members, {"dF": Value(1.5, "N", 42.0)})["dF"]
+    assert not one.identifiable
+    assert one.reason == "it is not determined: one standard error is 42 N"
+    assert vague(members, {"dF": Value(1.5, "N", 0.49)})["dF"].identifiable
+    assert not vague(members, {"dF": Value(1.5, "N", 0.51)})["dF"].identifiable
+    assert vague(members, {"dF": Value(1.5, "N", 42.0, "other")})["dF"].reason == "other"
+
+
+def test_a_ripples_sine_may_be_zero_beside_its_cosine_and_a_shape_counts_by_itself():
+    parameters = (
+        parameter("s"),
+        parameter("c"),
+        parameter("n", "shape", typical=0.0),
+        parameter("other", unit="m"),
+    )
+    members: Any = [SimpleNamespace(candidate=SimpleNamespace(parameters=parameters))]
+    values = {
+        "s": Value(1e-4, "N", 1e-3), "c": Value(-5e-2, "N", 1e-3), "n": Value(12.0, "1", 0.1),
+        "other": Value(1e-4, "m", 1e-3),
+    }  # fmt: skip
+    found = vague(members, values)
+    assert {n for n, v in found.items() if not v.identifiable} == {"other"}
+    assert not vague(members, {**values, "n": Value(12.0, "1", 4.1)})["n"].identifiable

@@ -1,0 +1,57 @@
+"""The verdict, in standard deviations of the noise, and the share that is left."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
+from thsa_cosim.diagnosis.results import ChannelError
+
+NOTHING = ChannelError(1.0, 1.0, 0.05, 2.0, 1000)
+#: Structure in standard deviations of the noise, significance, accepted effects, candidates → verdict.
+CASES = {
+    "noise only": (0.05, 2.0, 0, 40, "no-missing-effect"),
+    "small, if sure": (0.15, 50.0, 0, 40, "no-missing-effect"),
+    "large, but chance": (0.9, 6.0, 0, 40, "no-missing-effect"),
+    "visible": (0.151, 6.01, 0, 40, "unexplained-structure"),
+    "explained": (0.05, 2.0, 1, 40, "missing-effect"),
+    "explained but for the effect's form": (0.46, 90.0, 1, 40, "missing-effect"),
+    "named, and visible beside it": (0.461, 90.0, 1, 40, "unexplained-structure"),
+    "named, and chance beside it": (0.9, 5.0, 2, 40, "missing-effect"),
+    "much is left, a small share of what was": (2.5, 900.0, 2, 40, "unexplained-structure"),
+    "nothing could be tried": (2.5, 900.0, 0, 0, "not-tested"),
+    "nothing could be tried, and nothing is left": (0.05, 2.0, 0, 0, "not-tested"),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_verdict(name: str):
+    structure, significance, accepted, tested, expected = CASES[name]
+    shown = ChannelError(9.0, 2.0, 2.0 * structure, significance, 1000)
+    assert verdict_on({"v": NOTHING, "i": shown}, accepted, tested) == expected
+    assert verdict_on({"i": shown, "v": NOTHING}, accepted, tested) == expected
+
+
+def test_the_share_that_is_left_is_that_of_the_worst_signal_that_shows_anything():
+    samples = 20000
+    channels = [
+        SimpleNamespace(name=n, measured=np.zeros(samples), noise=0.5, weight=1.0) for n in ("v", "i", "u")
+    ]
+    trials: Any = [SimpleNamespace(case=SimpleNamespace(channels=channels))]
+    smooth = np.sin(np.arange(samples) * 0.01) * np.sqrt(2.0)
+    noise = np.random.default_rng(5).standard_normal(3 * samples)
+
+    def residual(*sizes: float) -> np.ndarray:
+        return np.concatenate([size * smooth for size in sizes]) + noise
+
+    assert left_over(trials, residual(10.0, 2.0, 0.0), residual(1.0, 1.0, 0.0)) == pytest.approx(
+        0.25, rel=0.05
+    )
+    # A third of a signal's own structure is left: not "0 %", however small it is against the noise.
+    assert left_over(trials, residual(10.0, 0.3, 0.0), residual(0.0, 0.1, 0.0)) == pytest.approx(
+        0.11, abs=0.03
+    )
+    assert left_over(trials, residual(10.0, 0.0, 0.0), residual(0.0, 0.0, 0.5)) == 1.0, "what came up anew"
+    assert left_over(trials, residual(0.0, 0.1, 0.0), residual(0.0, 0.1, 0.0)) == 0.0, "nothing to explain"

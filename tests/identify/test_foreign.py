@@ -1,0 +1,85 @@
+"""Identification with an FMU of another tool: what it does with inputs and start values is found out first."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmu_sources import build
+
+from tests.fmu.test_plant import lag
+from thsa_cosim.cli import run_command
+
+SCENARIO = """
+kind = "identify"
+fmu = "{fmu}"
+seed = 1
+
+[recordings]
+fit = ["run.csv"]
+time = {{ column = "t", unit = "s" }}
+
+[recordings.columns]
+u = {{ column = "u", unit = "m/s" }}
+y = {{ column = "y", unit = "m/s" }}
+
+[cost]
+error = "squared"
+
+[cost.channels.y]
+noise = 1e-3
+
+[[parameters]]
+name = "tau"
+variable = "tau"
+lower = 0.05
+upper = 0.5
+unit = "s"
+
+[[parameters]]
+name = "at"
+variable = "at"
+lower = 0.2
+upper = 0.8
+unit = "s"
+
+[search]
+population = 8
+generations = 12
+"""
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
+    folder = tmp_path_factory.mktemp("foreign")
+    time = np.linspace(0.0, 2.0, 401)
+    u = np.interp(time, [0.0, 0.2, 0.5, 1.1, 1.5, 2.0], [0.0, 1.0, 1.0, -0.5, 0.2, 0.2])
+    y = lag(time, u, 0.2, 1.0) + 1e-3 * np.random.default_rng(0).standard_normal(401)
+    table = np.column_stack([time, u, y])
+    np.savetxt(folder / "run.csv", table, delimiter=",", header="t,u,y", comments="", fmt="%.9g")
+    fmu = build.lag2("WRONG_SLOPE", "RESET_IN_SETUP", tool="vendor")
+    (folder / "s.toml").write_text(SCENARIO.format(fmu=fmu))
+    assert run_command(["identify", str(folder / "s.toml"), "-o", str(folder / "out"), "--quiet"]) == 0
+    found: dict[str, object] = json.loads((Path(folder) / "out" / "result.json").read_text())
+    return found
+
+
+def test_values_are_right_within_their_stated_errors(result: dict[str, object]) -> None:
+    tau = result["points"][0]["parameters"]["tau"]  # type: ignore[index]
+    assert tau["identifiable"]
+    assert abs(tau["value"] - 0.2) < 3.0 * tau["stderr"]
+    assert tau["stderr"] < 1e-3
+
+
+def test_the_parameter_that_does_nothing_is_named(result: dict[str, object]) -> None:
+    notes = result["notes"]
+    assert any(note.startswith("at changes no output of the FMU at all") for note in notes)  # type: ignore[attr-defined]
+    assert not any(note.startswith("tau") for note in notes)  # type: ignore[attr-defined]
+
+
+def test_the_inputs_are_given_in_the_way_that_the_trial_found(result: dict[str, object]) -> None:
+    (note,) = [note for note in result["notes"] if note.startswith("Inputs:")]  # type: ignore[attr-defined]
+    assert note.startswith(
+        "Inputs: held at the mean of a step (largest error over range against Model Exchange"
+    )
+    assert "WARNING" not in note

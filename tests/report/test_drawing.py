@@ -1,0 +1,49 @@
+"""A page's figure as a matplotlib figure: the same numbers in the same places."""
+
+import numpy as np
+import pytest
+
+from thsa_cosim.report.parts.chart import BEFORE, Chart
+from thsa_cosim.report.parts.drawing import draw
+
+
+def test_lines_bands_levels_and_scales_are_those_of_the_page() -> None:
+    chart = Chart("both", columns=2)
+    x = np.linspace(1.0, 10.0, 7)
+    chart.line(x, x**2, "square & <co>", colour=BEFORE, dash="dash")
+    chart.band(x, x, 2.0 * x, "band")
+    chart.level(3.0)
+    chart.points(x, 1.0 / x, "points", at=(0, 1), error=0.1 * x)
+    chart.axes(x="time [s]", y="cost of $ [1]", log_y=True, y_range=(0.0, 2.0))
+    chart.title("left")
+    left, right = draw(chart.build("")).axes
+    np.testing.assert_allclose(left.lines[0].get_ydata(), x**2, rtol=1e-6)
+    assert left.lines[0].get_color() == "#c4772b"
+    assert left.lines[0].get_linestyle() == "--"
+    assert left.lines[1].get_ydata()[0] == 3.0
+    assert len(left.patches) == 1
+    assert (left.get_yscale(), left.get_ylim()) == ("log", (1.0, 100.0))
+    assert (left.get_xlabel(), left.get_title(loc="left")) == ("time [s]", "left")
+    assert left.get_position().x1 < right.get_position().x0
+    bars = right.collections[0].get_segments()
+    assert bars[0][1][1] - bars[0][0][1] == pytest.approx(0.2, rel=1e-5)
+
+
+def test_bars_stand_beside_each_other_and_a_legend_names_each_once() -> None:
+    chart = Chart("bars")
+    chart.bars(["i_q", "v"], [1.0, 2.0], "before")
+    chart.bars(["i_q", "v"], [0.5, None], "after")
+    sheet = draw(chart.build(""))
+    (axes,) = sheet.axes
+    before, after = axes.patches[0], axes.patches[2]
+    assert before.get_x() + before.get_width() <= after.get_x() + 1e-9
+    assert [text.get_text() for text in sheet.legends[0].get_texts()] == ["before", "after"]
+    assert sheet._repr_png_().startswith(b"\x89PNG")
+
+
+def test_contours_leave_out_what_is_not_known() -> None:
+    chart = Chart("map")
+    z = np.array([[1.0, 2.0], [np.nan, 4.0]])
+    chart.add(0, 0, "", type="contour", x=[0.0, 1.0], y=[0.0, 1.0], z=z, ncontours=5)
+    chart.axes(x="a [1]", y="b [1]")
+    assert draw(chart.build("")).axes[0].get_xlabel() == "a [1]"

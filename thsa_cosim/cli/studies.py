@@ -1,0 +1,51 @@
+"""The commands about several studies: ``list`` and ``compare``."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from thsa_cosim.cli.options import PATH, console
+
+
+@click.command(name="list")
+@click.argument("folder", type=PATH, required=False)
+@click.option("--json", "as_json", is_flag=True, help="Print the studies as JSON.")
+def list_command(folder: Path | None, as_json: bool) -> None:
+    """List the studies in FOLDER and below, the latest first; default: studies, or this folder."""
+    from thsa_cosim.report.compare import list_studies
+    from thsa_cosim.report.compare.tables import print_list
+
+    place = folder or (Path("studies") if Path("studies").is_dir() else Path())
+    found = list_studies(place)
+    if as_json:
+        entries = [{**asdict(entry), "folder": str(entry.folder)} for entry in found]
+        click.echo(json.dumps(entries, indent=2))
+    elif found:
+        print_list(console(), found)
+    else:
+        click.echo(f"no study in {place}")
+
+
+@click.command()
+@click.argument("folders", metavar="A B ...", type=PATH, nargs=-1, required=True)
+@click.option("-o", "--output", type=PATH, default=None, help="Write the comparison as an HTML page, too.")
+@click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")
+def compare(folders: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
+    """Say what differs between study folders: parameters, effects, errors, settings, each against the first.
+
+    A difference comes with its standard error and z, the difference in standard errors.
+    """
+    from thsa_cosim.report.compare import compare as compared
+    from thsa_cosim.report.compare.page import write_comparison
+    from thsa_cosim.report.compare.tables import print_comparison
+
+    found = compared(folders)
+    if as_json:
+        click.echo(json.dumps(found.to_dict(), indent=2))
+    else:
+        print_comparison(console(), found)
+    if output is not None:
+        write_comparison(found, output)
+        click.echo(f"page: {output}", err=as_json)

@@ -1,0 +1,155 @@
+"""One round of the search: what to refine, which of it to accept, and what these recordings cannot tell from that."""
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+from thsa_cosim.diagnosis.choosing.gates import (
+    SIGMAS,
+    SMALLEST_STRUCTURE,
+    Evidence,
+    insignificant,
+    near_best,
+    objection,
+    out_of_range,
+    signal_share,
+)
+from thsa_cosim.diagnosis.choosing.score import Scored, go_on, polish, score
+from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit
+from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency
+from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
+from thsa_cosim.signals import FloatArray
+
+#: Rivals that leave less than this share of the gain unexplained cannot be told apart, ...
+TIE_SHARE = 0.005
+#: ... and those that reach less than this share of it are none.
+RIVAL_SHARE = 0.9
+#: How many effects are refined after each screening, if they promise at least this share of the best one's gain, and
+#: with how many starts each.
+REFINED, WORTH, STARTS = 6, 0.03, 2
+#: Once an effect leaves no structure, only those that promise this share of its gain are refined as rivals; and only
+#: those that reach this share of the best gain in two iterations are refined further.
+RIVAL_WORTH = 0.3
+
+Say = Callable[[str], None]
+
+
+def worth_refining(proposals: Sequence[Proposal], limit: float) -> list[Proposal]:
+    """The best starts of the best effects among ``proposals`` (best first) that promise more than chance."""
+    chosen: list[Proposal] = []
+    per_effect: dict[str, int] = {}
+    worth = max(limit, WORTH * proposals[0].gain) if proposals else limit
+    for proposal in proposals:
+        name = proposal.candidate.effect.name
+        if proposal.gain < worth or (name not in per_effect and len(per_effect) == REFINED):
+            continue
+        per_effect[name] = per_effect.get(name, 0) + 1
+        if per_effect[name] <= STARTS:
+            chosen.append(proposal)
+    return chosen
+
+
+def other_places(winner: Proposal, proposals: Sequence[Proposal]) -> list[Proposal]:
+    """The best proposal of the winner's effect in every other place that promises nearly as much."""
+    found: dict[str, Proposal] = {}
+    for proposal in proposals:
+        candidate, name = proposal.candidate, proposal.candidate.name
+        same = candidate.effect.name == winner.candidate.effect.name and name != winner.candidate.name
+        if same and proposal.gain >= RIVAL_WORTH * winner.gain:
+            found.setdefault(name, proposal)
+    return list(found.values())
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """A round against the model so far: its fit ``current`` and its held-out residuals ``held`` (N,)."""
+
+    bench: Bench
+    weights: ChannelWeights
+    current: Fit
+    held: FloatArray
+    say: Say = lambda _: None
+
+    def refined(self, proposals: Sequence[Proposal], limit: float) -> list[Scored]:
+        """What is worth it, fitted with the declared parameters, best on held-out recordings first."""
+        scored: list[Scored] = []
+        solved = 0.0
+        for proposal in worth_refining(proposals, limit):
+            if proposal.gain < RIVAL_WORTH * solved:
+                continue
+            self.say(f"fitting {proposal.label}")
+            result = score(self.bench, self.current, self.held, proposal)
+            if result is not None:
+                scored.append(result)
+                if self.weights.left(result.validate) < SMALLEST_STRUCTURE**2:
+                    solved = max(solved, result.fit_gain, proposal.gain)
+        most = max((s.fit_gain for s in scored), default=0.0)
+        scored = [self._go_on(s) if s.fit_gain > RIVAL_WORTH * most else s for s in scored]
+        return sorted(scored, key=lambda s: -s.held_out_gain)
+
+    def evidence(self, one: Scored) -> Evidence:
+        """What speaks for a candidate."""
+        trials, base = self.bench.of("validate"), self.weights.base_held
+        return Evidence(
+            name=one.candidate.name,
+            fit_gain=one.fit_gain,
+            held_out_gain=one.held_out_gain,
+            consistency=one.consistency,
+            left=self.weights.left(self.held),
+            share=one.share,
+            signal_share=signal_share(trials, base, self.held, one.validate),
+        )
+
+    def choose(
+        self, scored: Sequence[Scored], limit: float, first: bool
+    ) -> tuple[Scored | None, tuple[str, ...]]:
+        """The effect to accept, fitted with all parameters, if any; why each that was tried was not, "" for it."""
+        objections: list[str] = []
+        doubtful: Scored | None = None
+        for one in near_best(scored):
+            why = objection(self.evidence(one), limit, first)
+            if not why:
+                self.say(f"fitting {one.candidate.name} with all parameters")
+                one = polish(self.bench, one, self.current, self.held)
+                why = insignificant(one)
+                if not why and (name := out_of_range(one.fit)):
+                    why = f"{one.candidate.name}: it drives the declared parameter {name} to the end of its range"
+                    doubtful = doubtful or one  # another effect that is still missing may do that
+            objections.append(why)
+            if not why:
+                return one, tuple(objections)
+        return doubtful, tuple(objections)
+
+    def elsewhere(
+        self, winner: Scored, scored: Sequence[Scored], proposals: Sequence[Proposal]
+    ) -> list[Scored]:
+        """The winner's effect in the places that were not refined, fitted: behind a rigid gear they are one law."""
+        found = []
+        for proposal in other_places(winner.proposal, proposals):
+            if not any(s.candidate.name == proposal.candidate.name for s in scored):
+                self.say(f"fitting {proposal.label}")
+                result = score(self.bench, self.current, self.held, proposal)
+                found += [] if result is None else [self._go_on(result)]
+        return found
+
+    def rivals(self, winner: Scored, scored: Sequence[Scored], named: Collection[str]) -> tuple[Scored, ...]:
+        """What explains the held-out recordings as well: other effects than those ``named`` before, other places."""
+        effect, own = winner.candidate.effect.name, winner.candidate.name
+        rivals: dict[str, Scored] = {}
+        for other in scored:
+            candidate = other.candidate
+            name = candidate.name if candidate.effect.name == effect else candidate.effect.name
+            if name in (own, *rivals, *named) or other.held_out_gain < RIVAL_SHARE * winner.held_out_gain:
+                continue
+            polished = polish(self.bench, other, self.current, self.held)
+            if self._ties(polished, winner):
+                rivals[name] = polished
+        return tuple(rivals.values())
+
+    def _go_on(self, one: Scored) -> Scored:
+        return go_on(self.bench, one, self.current, self.held)
+
+    def _ties(self, other: Scored, winner: Scored) -> bool:
+        lead = block_gains(self.bench.of("validate"), other.validate, winner.validate)
+        return consistency(lead) < SIGMAS or float(lead.sum()) < TIE_SHARE * winner.held_out_gain

@@ -1,0 +1,214 @@
+"""A page's figure as a matplotlib figure: files and notebooks show the drawing that the page shows.
+
+Understands what ``chart`` makes: lines, markers with error bars, filled bands, bars, contours, levels and headings.
+"""
+
+import base64
+import html
+import io
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure as Sheet
+from numpy.typing import NDArray
+
+from thsa_cosim.report.parts import content
+
+FloatArray = NDArray[np.float64]
+Trace = Mapping[str, Any]
+
+WIDTH_PX, PX_PER_INCH = 980, 100
+_DASHES = {"dash": "--", "dot": ":", "dashdot": "-.", "solid": "-"}
+_SYMBOLS = {
+    "circle": "o",
+    "circle-open": "o",
+    "diamond": "D",
+    "star": "*",
+    "cross": "P",
+    "x": "X",
+    "square": "s",
+}
+
+
+class Drawing(Sheet):
+    """A matplotlib figure that notebooks show without ``%matplotlib``; ``savefig`` writes it to a file."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png", dpi=PX_PER_INCH)
+        return buffer.getvalue()
+
+
+def draw(figure: content.Figure) -> Drawing:
+    """Draw a figure of the page in its light colours."""
+    layout = figure.layout
+    sheet = Drawing(figsize=(WIDTH_PX / PX_PER_INCH, figure.height / PX_PER_INCH))
+    FigureCanvasAgg(sheet)
+    panels = _panels(sheet, layout, figure.data)
+    named: dict[str, Any] = {}
+    for k, trace in enumerate(figure.data):
+        axes = panels[trace.get("xaxis", "x")]
+        handle = _TRACES[trace["type"]](axes, trace, figure.data)
+        if trace.get("showlegend") and trace.get("name"):
+            named.setdefault(_plain(trace["name"]), handle)
+        axes.set_zorder(1.0 + 0.001 * k)
+    for shape in layout.get("shapes", ()):
+        line = shape["line"]
+        panels["x" + shape["yref"].split()[0][1:]].axhline(
+            shape["y0"], color=_colour(line["color"]), lw=line["width"], ls=_DASHES.get(line["dash"], "-")
+        )
+    for name, axes in panels.items():
+        _finish(axes, layout, name[1:])
+    for note in layout.get("annotations", ()):
+        panels[note["xref"].split()[0]].set_title(
+            _plain(note["text"]), loc="left", fontsize=9.5, weight="bold", pad=5
+        )
+    if named:
+        sheet.legend(
+            [h for h in named.values() if h is not None],
+            [n for n, h in named.items() if h is not None],
+            loc="upper left",
+            bbox_to_anchor=(70 / WIDTH_PX, 1.0 - 4 / figure.height),
+            ncols=max(1, min(len(named), 135 // (max(map(len, named)) + 7))),
+            frameon=False,
+            fontsize=8.5,
+        )
+    return sheet
+
+
+def save(figure: content.Figure, path: Path) -> Path:
+    """Write a figure as PNG; return ``path``."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draw(figure).savefig(path, dpi=130, format="png")
+    return path
+
+
+def _panels(sheet: Drawing, layout: Mapping[str, Any], data: Sequence[Trace]) -> dict[str, Axes]:
+    """Axes by plotly's name of their x axis, where plotly puts them."""
+    height = layout["height"]
+    left, right = 82 / WIDTH_PX, 24 / WIDTH_PX
+    above, below = layout["margin"]["t"] / height, (layout["margin"]["b"] + 4) / height
+    wide, high = 1.0 - left - right, 1.0 - above - below
+    found: dict[str, Axes] = {}
+    for key in dict.fromkeys(f"xaxis{trace.get('xaxis', 'x')[1:]}" for trace in data):
+        number = key.removeprefix("xaxis")
+        x, y = layout[key]["domain"], layout[f"yaxis{number}"]["domain"]
+        place = (left + wide * x[0], below + high * y[0], wide * (x[1] - x[0]), high * (y[1] - y[0]))
+        found[f"x{number}"] = sheet.add_axes(place)
+    return found
+
+
+def _finish(axes: Axes, layout: Mapping[str, Any], number: str) -> None:
+    for letter, axis in (("x", axes.xaxis), ("y", axes.yaxis)):
+        asked = layout[f"{letter}axis{number}"]
+        if asked.get("type") == "log":
+            (axes.set_xscale if letter == "x" else axes.set_yscale)("log")
+        if "title" in asked:
+            axis.set_label_text(_plain(asked["title"]["text"]), fontsize=9)
+        if "range" in asked:
+            ends = [10.0**v for v in asked["range"]] if asked.get("type") == "log" else asked["range"]
+            (axes.set_xlim if letter == "x" else axes.set_ylim)(*ends)
+        elif asked.get("rangemode") == "tozero":
+            (axes.set_xlim if letter == "x" else axes.set_ylim)(0.0, None)
+        if asked.get("showticklabels") is False:
+            axis.set_tick_params(labelbottom=False)
+    axes.tick_params(labelsize=8)
+    axes.grid(True, color="0.9", lw=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def _scatter(axes: Axes, trace: Trace, _every: Sequence[Trace]) -> Any:
+    x, y = _values(trace["x"]), _values(trace["y"])
+    if trace.get("fill") == "toself":
+        known = np.isfinite(x) & np.isfinite(y)
+        return (
+            axes.fill(x[known], y[known], color=_colour(trace["fillcolor"]), lw=0)[0] if known.any() else None
+        )
+    style: dict[str, Any] = {"ls": "none"}
+    line, marker = trace.get("line", {}), trace.get("marker", {})
+    if "lines" in trace["mode"]:
+        style |= {"ls": _DASHES.get(line.get("dash", "solid"), "-"), "lw": 0.75 * line.get("width", 1.5)}
+        style["color"] = _colour(line.get("color", marker.get("color", "black")))
+    if "markers" in trace["mode"]:
+        colour, symbol = _colour(marker["color"]), str(marker.get("symbol", "circle"))
+        style |= {"marker": _SYMBOLS.get(symbol, "o"), "ms": 0.75 * marker.get("size", 7), "color": colour}
+        style["mfc"] = "none" if symbol.endswith("-open") else colour
+        style["mec"] = _colour(marker.get("line", {}).get("color", marker["color"]))
+        style["mew"] = marker.get("line", {}).get("width", 1)
+    if "error_y" in trace:
+        errors = _values(trace["error_y"]["array"])
+        return axes.errorbar(x, y, yerr=errors, capsize=2, elinewidth=0.9, **style)
+    return axes.plot(x, y, **style)[0]
+
+
+def _bar(axes: Axes, trace: Trace, every: Sequence[Trace]) -> Any:
+    beside = [t for t in every if t["type"] == "bar" and t.get("xaxis") == trace.get("xaxis")]
+    labels = list(dict.fromkeys(_plain(label) for t in beside for label in t["x"]))
+    width = 0.8 / len(beside)
+    shift = (next(k for k, t in enumerate(beside) if t is trace) + 0.5) * width - 0.4
+    at = [labels.index(_plain(label)) + shift for label in trace["x"]]
+    heights = [np.nan if h is None else h for h in trace["y"]]
+    given = trace["marker"]["color"]
+    shades = _colour(given) if isinstance(given, str) else [_colour(one) for one in given]
+    drawn = axes.bar(at, heights, width=0.94 * width, color=shades)
+    axes.set_xticks(range(len(labels)), labels)
+    return drawn
+
+
+def _contour(axes: Axes, trace: Trace, _every: Sequence[Trace]) -> Any:
+    x, y, z = _values(trace["x"]), _values(trace["y"]), _values(trace["z"])
+    if trace.get("contours", {}).get("type") == "constraint":
+        axes.contourf(
+            x, y, z, levels=[trace["contours"]["value"], np.inf], colors=[(0.2, 0.2, 0.2)], alpha=0.45
+        )
+        return axes.fill([], [], color=(0.2, 0.2, 0.2, 0.45))[0]
+    if not np.isfinite(z).any():
+        return None
+    shades = "viridis_r" if trace.get("reversescale") else "viridis"
+    filled = axes.contourf(x, y, np.ma.masked_invalid(z), levels=trace.get("ncontours", 20), cmap=shades)
+    label = _plain(trace.get("colorbar", {}).get("title", {}).get("text", ""))
+    axes.get_figure().colorbar(filled, ax=axes, label=label)  # type: ignore[union-attr]
+    return None
+
+
+_TRACES = {"scatter": _scatter, "bar": _bar, "contour": _contour}
+
+
+def _values(packed: Any) -> FloatArray:
+    """The numbers of a trace, packed or not, as (n,) or (n, m)."""
+    if not isinstance(packed, Mapping):
+        return np.asarray(packed, dtype=np.float64)
+    values = np.frombuffer(base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}").astype(np.float64)
+    return values.reshape([int(n) for n in packed["shape"].split(",")]) if "shape" in packed else values
+
+
+def _plain(text: str) -> str:
+    """What plotly shows, for matplotlib, which reads formulas between dollars."""
+    return html.unescape(re.sub(r"<[^>]+>", "", text)).replace("$", r"\$")
+
+
+@cache
+def _palette() -> dict[str, str]:
+    """The style sheet's light colours by name."""
+    sheet = files("thsa_cosim.report.page").joinpath("templates", "page.css").read_text(encoding="utf-8")
+    light = sheet[sheet.index("{") + 1 : sheet.index("}")]
+    return dict(re.findall(r"(--[\w-]+):\s*([^;]+);", light))
+
+
+def _colour(name: str) -> Any:
+    """A colour of the page as matplotlib wants it."""
+    shade = _palette()[name[4:-1]] if name.startswith("var(") else name
+    numbers = re.fullmatch(r"rgba?\(([^)]*)\)", shade)
+    if numbers is None:
+        return shade
+    red, green, blue, *alpha = (float(part) for part in numbers[1].split(","))
+    return (red / 255.0, green / 255.0, blue / 255.0, *alpha)

@@ -1,0 +1,114 @@
+"""How the FMUs of a study are given their inputs: what the scenario fixes, else what a trial finds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from thsa_cosim.batch import Experiment
+from thsa_cosim.batch.handling import HandlingTrial, try_input_handling
+from thsa_cosim.errors import FmuError, ParameterError
+from thsa_cosim.fmu.description import FmuDescription, read_description
+from thsa_cosim.fmu.inputs import input_variables, is_linear, is_ours
+from thsa_cosim.fmu.plant import Kind
+from thsa_cosim.scenario.model import SimulationSpec
+
+WARN = 1e-3
+"""A deviation over range, from half the step or Model Exchange, above which results are doubted."""
+_STEPS = 4000
+"""Communication steps of a trial; more only until the inputs have begun to move."""
+_trials: dict[tuple[str, str, tuple[str, ...], int, bytes], HandlingTrial] = {}
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What a runner is opened with."""
+
+    interface: Kind | None
+    modes: tuple[str | None, ...]
+    """One per experiment; None: as its FMU is trusted."""
+    notes: tuple[str, ...]
+
+
+def settle_handling(spec: SimulationSpec, experiments: Sequence[Experiment]) -> Settled:
+    """Try each foreign Co-Simulation FMU once on the first of its experiments that has inputs.
+
+    The choice depends on the FMU, the scenario and the recordings alone, so that a continued study makes it again.
+    """
+    found: dict[str, HandlingTrial] = {}
+    digests: dict[int, str] = {}
+    for index, experiment in enumerate(experiments):
+        description = _in_question(spec, experiment)
+        if description is None:
+            continue
+        digests[index] = description.sha256
+        if description.sha256 not in found:
+            trial = _trial(spec, description, experiment)
+            if trial is not None:
+                found[description.sha256] = trial
+    interface = spec.interface
+    everywhere = len(digests) == len(experiments) and set(digests.values()) == set(found)
+    if spec.interface is None and spec.inputs is None and everywhere:
+        kinds = {trial.kind for trial in found.values()}
+        if kinds == {"model-exchange"}:
+            interface = "model-exchange"
+    modes: list[str | None] = []
+    for index in range(len(experiments)):
+        best = found[digests[index]].best if digests.get(index) in found else None
+        modes.append(spec.inputs or (best.mode if best is not None else None))
+    notes = [_note(spec, trial, interface) for trial in found.values()]
+    return Settled(interface, tuple(modes), tuple(note for note in notes if note))
+
+
+def _in_question(spec: SimulationSpec, experiment: Experiment) -> FmuDescription | None:
+    """The FMU's description if there is anything to find out about its inputs."""
+    if spec.interface == "model-exchange" or experiment.inputs is None:
+        return None
+    try:
+        description = read_description(experiment.fmu)
+        linear = [
+            v for v in input_variables(description, experiment.inputs) if is_linear(experiment.inputs, v)
+        ]
+    except (FmuError, ParameterError):
+        return None  # said elsewhere, or a wrapper's inputs
+    foreign = description.supports_co_simulation and not is_ours(description)
+    return description if foreign and linear else None
+
+
+def _trial(spec: SimulationSpec, description: FmuDescription, experiment: Experiment) -> HandlingTrial | None:
+    assert experiment.inputs is not None
+    table = np.array([experiment.inputs[name] for name in experiment.inputs.names])
+    moving = np.flatnonzero((np.diff(table, axis=1) != 0.0).any(axis=0))
+    begin = float(experiment.inputs.time[moving[0]]) if len(moving) else 0.0
+    count = _STEPS + int(np.searchsorted(experiment.time, begin))
+    own = experiment.wrapper_names
+    fixed = {name: value for name, value in experiment.fixed.items() if name not in own}
+    short = replace(experiment, time=experiment.time[: count + 1], fixed=fixed)
+    excitation = table.tobytes() + repr((sorted(fixed.items()), spec.tolerance)).encode()
+    key = description.sha256, experiment.name, tuple(experiment.outputs), len(short.time), excitation
+    if key not in _trials:
+        try:
+            _trials[key] = try_input_handling(short, deadline_s=spec.deadline)
+        except (FmuError, ParameterError):
+            return None
+    return _trials[key]
+
+
+def _note(spec: SimulationSpec, trial: HandlingTrial, interface: Kind | None) -> str:
+    """What is used, and a warning with figures where it is not to be trusted."""
+    best = trial.best
+    if best is None:
+        return f"How inputs reach the FMU could not be tried: {trial.sentence()}."
+    if interface == "model-exchange":
+        return f"Inputs: {trial.sentence()}."
+    used = next((way for way in trial.ways if way.mode == spec.inputs), best)
+    chosen = f"Inputs: {trial.sentence()}."
+    if spec.inputs is not None:
+        chosen = f"Inputs: {used.mode!r}, as the scenario says; a trial would have used {trial.sentence()}."
+    if used.error <= WARN:
+        return chosen
+    return (
+        f"{chosen} WARNING: {used.worst} of this Co-Simulation is {used.error:.1e} of its range off "
+        f"{trial.reference} on these recordings ({used.halved:.1e} with half the step): identified values carry that "
+        f'error; lower simulation.step, or set simulation.interface = "model-exchange" if the FMU offers it.'
+    )

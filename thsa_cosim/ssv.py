@@ -12,8 +12,8 @@ from pathlib import Path
 from thsa_cosim.errors import ParameterError, UnitError
 from thsa_cosim.units import base_exponents
 
-_SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
-_SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
+SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 
 
 @dataclass(frozen=True)
@@ -36,24 +36,24 @@ def write_ssv(path: Path, parameters: ParameterSet) -> None:
     UnitError
         For a unit that is unknown.
     """
-    ET.register_namespace("ssv", _SSV)
-    ET.register_namespace("ssc", _SSC)
-    root = ET.Element(f"{{{_SSV}}}ParameterSet", {"version": "1.0", "name": parameters.name})
+    ET.register_namespace("ssv", SSV)
+    ET.register_namespace("ssc", SSC)
+    root = ET.Element(f"{{{SSV}}}ParameterSet", {"version": "1.0", "name": parameters.name})
     if parameters.description:
         root.set("description", parameters.description)
     root.set("generationTool", "thsa-cosim")
-    listed = ET.SubElement(root, f"{{{_SSV}}}Parameters")
+    listed = ET.SubElement(root, f"{{{SSV}}}Parameters")
     used: dict[str, None] = {}
     for name, value in parameters.values.items():
         if not math.isfinite(value):
             raise ParameterError(f"{path}: value of {name!r} is {value}; only finite values can be written.")
-        real = ET.SubElement(ET.SubElement(listed, f"{{{_SSV}}}Parameter", {"name": name}), f"{{{_SSV}}}Real")
+        real = ET.SubElement(ET.SubElement(listed, f"{{{SSV}}}Parameter", {"name": name}), f"{{{SSV}}}Real")
         real.set("value", repr(float(value)))
         if unit := parameters.units.get(name, ""):
             real.set("unit", unit)
             used[unit] = None
     if used:
-        units = ET.SubElement(root, f"{{{_SSV}}}Units")
+        units = ET.SubElement(root, f"{{{SSV}}}Units")
         for unit in used:
             exponents, factor, offset = base_exponents(unit)
             attributes = {base: str(power) for base, power in exponents.items()}
@@ -62,7 +62,7 @@ def write_ssv(path: Path, parameters: ParameterSet) -> None:
             if offset != 0.0:
                 attributes["offset"] = repr(offset)
             ET.SubElement(
-                ET.SubElement(units, f"{{{_SSC}}}Unit", {"name": unit}), f"{{{_SSC}}}BaseUnit", attributes
+                ET.SubElement(units, f"{{{SSC}}}Unit", {"name": unit}), f"{{{SSC}}}BaseUnit", attributes
             )
     ET.indent(root)
     ET.ElementTree(root).write(path, encoding="UTF-8", xml_declaration=True)
@@ -82,22 +82,27 @@ def read_ssv(path: Path) -> ParameterSet:
         raise ParameterError(f"{path}: cannot be read ({error.strerror or error}); check the path.") from None
     except (ET.ParseError, ValueError, LookupError) as error:
         raise ParameterError(f"{path}: is no XML file ({error}); give a .ssv file of SSP 1.0.") from None
-    if root.tag != f"{{{_SSV}}}ParameterSet":
+    return parse_ssv(root, path)
+
+
+def parse_ssv(root: ET.Element, path: Path | str) -> ParameterSet:
+    """Read a ParameterSet element; ``path`` is what messages name. Raises as :func:`read_ssv` does."""
+    if root.tag != f"{{{SSV}}}ParameterSet":
         raise ParameterError(f"{path}: holds {root.tag!r}, not the ParameterSet of an SSP 1.0 .ssv file.")
     values: dict[str, float] = {}
     units: dict[str, str] = {}
-    for parameter in root.iterfind(f"{{{_SSV}}}Parameters/{{{_SSV}}}Parameter"):
+    for parameter in root.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
         name = parameter.get("name", "")
         if name in values:
             raise ParameterError(f"{path}: parameter {name!r} is set twice; remove one.")
         values[name] = _number(path, name, parameter)
-        real = parameter.find(f"{{{_SSV}}}Real")
+        real = parameter.find(f"{{{SSV}}}Real")
         if real is not None and real.get("unit"):
             units[name] = _known_unit(path, name, real.get("unit", ""))
     return ParameterSet(root.get("name", ""), values, units, root.get("description", ""))
 
 
-def _known_unit(path: Path, name: str, unit: str) -> str:
+def _known_unit(path: Path | str, name: str, unit: str) -> str:
     try:
         base_exponents(unit)
     except UnitError as error:
@@ -105,9 +110,9 @@ def _known_unit(path: Path, name: str, unit: str) -> str:
     return unit
 
 
-def _number(path: Path, name: str, parameter: ET.Element) -> float:
+def _number(path: Path | str, name: str, parameter: ET.Element) -> float:
     child = next(iter(parameter), None)
-    kind = "nothing" if child is None else child.tag.removeprefix(f"{{{_SSV}}}")
+    kind = "nothing" if child is None else child.tag.removeprefix(f"{{{SSV}}}")
     if child is None or kind not in ("Real", "Integer", "Boolean"):
         raise ParameterError(f"{path}: parameter {name!r} holds {kind}; only numbers can be set.")
     text = child.get("value", "").strip()

@@ -167,7 +167,7 @@ def test_a_scenario_of_another_kind_names_the_right_one(tmp_path: Path) -> None:
     path.write_text(
         text.replace('"../fmus/', f'"{ROOT / "fmus"}/').replace('"recordings/driven_*.parquet"', recording)
     )
-    with pytest.raises(ScenarioError, match="of kind .simulate.: run .thsa-cosim simulate "):
+    with pytest.raises(ScenarioError, match=r"of kind .simulate.: run .thsa-cosim simulate "):
         tc.identify(path)
 
 

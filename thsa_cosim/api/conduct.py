@@ -254,12 +254,26 @@ def conduct(asked: Asked, *, quiet: bool = False) -> Conducted:
     from thsa_cosim.report.progress import ProgressDisplay, console
 
     kind, folder = asked.kind, asked.place.folder
+    if not quiet:
+        show_data(asked, console(stderr=True))
     if kind.name == "diagnose" and _is_complete(asked):
         return Conducted(asked, None, tuple(path for path in folder.rglob("*") if path.is_file()))
     with ProgressDisplay(console(stderr=True), quiet=quiet) as display:
         result = kind.run(asked.scenario, replace(asked.place, on_progress=display))
         files = kind.write(result, folder)
     return Conducted(asked, result, tuple(files))
+
+
+def show_data(asked: Asked, out: "Console") -> None:
+    """Print, one line each, what is wrong with the recordings, before anything is simulated."""
+    from thsa_cosim.report.inspection import print_inspection
+    from thsa_cosim.scenario import Scenario, StagedScenario
+
+    scenario = asked.scenario
+    several = [s.scenario for s in scenario.stages] if isinstance(scenario, StagedScenario) else [scenario]
+    for one in several:
+        if isinstance(one, Scenario):
+            print_inspection(out, one.data, notes=False)
 
 
 def read_result(folder: Path) -> dict[str, Any] | None:

@@ -24,8 +24,9 @@ from thsa_cosim.batch.local import LocalRunner
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.runner import OnOutcome, check_experiment, check_jobs, wrapper_names
 from thsa_cosim.errors import FmuError, MachineError, MissingExtraError, StudyError
-from thsa_cosim.fmu.description import FmuDescription, read_description
+from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.scratch import ScratchFolder
+from thsa_cosim.system import read_description
 
 _CONNECT_S = 20.0
 _ATTEMPTS = 3

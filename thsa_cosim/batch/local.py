@@ -8,6 +8,8 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
+from threadpoolctl import threadpool_limits
+
 from thsa_cosim.batch.attempts import Attempt, Batch, fault_of, signal_name
 from thsa_cosim.batch.frames import Done, Order, Ready, Returned, Setup
 from thsa_cosim.batch.inbox import Inbox, open_inbox
@@ -113,8 +115,10 @@ class LocalRunner:
         self._failed_starts = 0
         self._next_tick = 0.0
         self._typical_s = 1.0
+        # The cores are the workers': a search's small products in BLAS threads cost ten times their own time.
+        blas = threadpool_limits(limits=1, user_api="blas")
         # Also at interpreter exit and when the runner is forgotten; must not refer to self.
-        self._finalizer = weakref.finalize(self, _shut_down, self._workers, self._inbox, self._study)
+        self._finalizer = weakref.finalize(self, _shut_down, self._workers, self._inbox, self._study, blas)
         self._staff(workers)
 
     # -- public ---------------------------------------------------------------------------------------
@@ -374,8 +378,9 @@ class LocalRunner:
         return Status.CRASH, f"the process died by {signal_name(code)}"
 
 
-def _shut_down(workers: list[WorkerProcess], inbox: Inbox, study: Study) -> None:
-    """Stop all workers, idle ones politely, and remove the study's folder."""
+def _shut_down(workers: list[WorkerProcess], inbox: Inbox, study: Study, blas: threadpool_limits) -> None:
+    """Stop all workers, idle ones politely, remove the study's folder, and give BLAS its threads back."""
+    blas.restore_original_limits()
     for worker in workers:
         if not worker.assigned:
             worker.ask_to_stop()

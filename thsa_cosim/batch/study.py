@@ -10,10 +10,10 @@ from thsa_cosim.batch.job import Experiment
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.runner import by_name, check_experiment
 from thsa_cosim.errors import FmuError, MachineError
-from thsa_cosim.fmu.archive import unpack
-from thsa_cosim.fmu.description import FmuDescription, read_description
+from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.machine import refuse_noexec, temporary_fault
 from thsa_cosim.fmu.scratch import ScratchFolder
+from thsa_cosim.system import read_description, unpack
 
 
 class Study:
@@ -65,7 +65,7 @@ class Study:
                 self.main = {key: data_of_main[key] for key in wanted if key in data_of_main}
             file = self.folder / "experiments" / f"{self.index[name]}.pickle"
             file.write_bytes(data)
-            self._made += [file, self._fmu_folder(found) / "modelDescription.xml"]
+            self._made += [file, *(p for p in self._fmu_folder(found).iterdir() if p.is_file())]
 
     def trouble(self) -> MachineError | None:
         """Say what is wrong with the temporary folder: gone, in part or whole, or nothing can be written."""

@@ -53,6 +53,7 @@ from thsa_cosim.fmu.instance import Phase
 from thsa_cosim.fmu.machine import is_machines, temporary_fault
 from thsa_cosim.fmu.plant import Plant
 from thsa_cosim.signals import Signals
+from thsa_cosim.system import open_plant
 
 PROGRESS_SLOTS = 8
 SERIAL = 4
@@ -209,7 +210,7 @@ class Worker:
             self._live.close()  # one live instance per process
         if plant is None:
             setup: Any = self._setup
-            plant = Plant(
+            plant = open_plant(
                 description,
                 Path(folder),
                 kind=setup.kind,

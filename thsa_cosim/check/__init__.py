@@ -9,8 +9,9 @@ from pathlib import Path
 
 from thsa_cosim.check.finding import CheckReport, Finding, Verdict
 from thsa_cosim.check.trials import Trials
-from thsa_cosim.fmu import probe, read_description
+from thsa_cosim.fmu import probe
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.system import read_description
 
 __all__ = ["CheckReport", "Finding", "Verdict", "check_fmu"]
 

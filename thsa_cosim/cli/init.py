@@ -37,8 +37,8 @@ def init(fmu: Path, recordings: tuple[Path, ...], output: Path) -> None:
     the file. It runs as it is.
     """
     from thsa_cosim.draft import draft_scenario
-    from thsa_cosim.fmu import read_description
     from thsa_cosim.scenario import load_scenario
+    from thsa_cosim.system import read_description
 
     if output.exists():
         raise InputError(f"{output} exists already; choose another file with -o.")

@@ -206,6 +206,7 @@ class _Closing:
             evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if changed else 0),
             failures=counts,
             notes=tuple(notes),
+            data=self.scenario.data,
         )
 
     def _declared(self) -> Identified:

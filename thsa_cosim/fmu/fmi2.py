@@ -91,6 +91,11 @@ class Fmi2Instance(Instance):
         self.set_start_again()
         self.call("EnterInitializationMode")
 
+    def do_step(self, time: float, step: float) -> None:
+        """fmi2DoStep; SimulationFailure also where the FMU discards the step."""
+        arguments = (ctypes.c_double, time), (ctypes.c_double, step), (ctypes.c_int, 1)
+        self.call("DoStep", *arguments, time=time)
+
     def value_function(self, verb: str, suffix: str) -> Any:
         """fmi2SetReal, fmi2GetInteger, ..."""
         pointer = ctypes.c_void_p

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.instance import EventInfo, Instance
 from thsa_cosim.signals import FloatArray
 
@@ -103,6 +104,25 @@ class Fmi3Instance(Instance):
             (ctypes.c_bool, True),
             (ctypes.c_double, stop),
         )
+
+    def do_step(self, time: float, step: float) -> None:
+        """fmi3DoStep; SimulationFailure also where the FMU returns early or asks to terminate."""
+        flags, last = (ctypes.c_bool * 3)(), ctypes.c_double(np.nan)
+        base = ctypes.addressof(flags)
+        self.call(
+            "DoStep",
+            (ctypes.c_double, time),
+            (ctypes.c_double, step),
+            (ctypes.c_bool, True),
+            *((ctypes.c_void_p, base + i) for i in range(3)),
+            (ctypes.c_void_p, ctypes.addressof(last)),
+            time=time,
+        )
+        if flags[1] or last.value < time + 0.999 * step:
+            what = "asks to terminate" if flags[1] else "returned early"
+            raise SimulationFailure(
+                Status.INCOMPLETE, f"the FMU {what} at t = {time:.9g} s{self.messages.last()}"
+            )
 
     def value_function(self, verb: str, suffix: str) -> Any:
         """fmi3SetFloat64, fmi3GetInt32, ..."""

@@ -101,6 +101,10 @@ class Instance(ABC):
         """Return (enter event mode, terminate)."""
 
     @abstractmethod
+    def do_step(self, time: float, step: float) -> None:
+        """Go from ``time`` to ``time + step`` [s] (Co-Simulation), inputs as they were last set."""
+
+    @abstractmethod
     def value_function(self, verb: str, suffix: str) -> Any:
         """Return the C function that sets or gets (``verb``) variables of one type."""
 

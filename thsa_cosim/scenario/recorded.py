@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from thsa_cosim.errors import InputError, ScenarioError, did_you_mean
-from thsa_cosim.fmu import FmuDescription, read_description
+from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Column, Recording, TimeAxis, read_recording
 from thsa_cosim.scenario import check
@@ -26,6 +26,7 @@ from thsa_cosim.scenario.recording_schema import TemperatureTable
 from thsa_cosim.scenario.schema import KINDS, CommonTable, DiagnoseTable, IdentifyTable, SimulateTable
 from thsa_cosim.scenario.sentences import from_validation, one_line
 from thsa_cosim.scenario.source import Source, about_kind, read_source
+from thsa_cosim.scenario.system import open_model
 
 
 def load_scenario(
@@ -88,8 +89,7 @@ def _resolve(
     seed: int | None,
     fmu: FmuDescription | Path | str | None,
 ) -> Scenario:
-    folder = path.parent
-    description = fmu if isinstance(fmu, FmuDescription) else read_description(fmu or folder / table.fmu)
+    description = open_model(path, table, fmu)
     inputs, measured = check.roles(table, description)
     parameters = check.parameters(table, description) if isinstance(table, IdentifyTable) else ()
     space = ParameterSpace(tuple(p for p, _ in parameters))
@@ -151,7 +151,8 @@ def _recordings(
     parts_held_out: bool,
 ) -> dict[str, tuple[Recording, ...]]:
     """Read the files of each role; parts cut the fit files, ``parts_held_out``: into both roles."""
-    columns = {name: Column(**column.model_dump()) for name, column in table.recordings.columns.items()}
+    columns = {name: column.source() for name, column in table.recordings.columns.items()}
+    driven = frozenset(name for name in columns if description.variables[name].causality == "input")
     units = {name: description.variables[name].unit or None for name in columns}
     source = table.temperature
     temperature: str | Column | None = None
@@ -162,7 +163,9 @@ def _recordings(
 
     def read(role: str, path: Path, axis: TimeAxis, name: str) -> None:
         found[role].append(
-            read_recording(path, columns, time=axis, units=units, temperature=temperature, name=name)
+            read_recording(
+                path, columns, time=axis, units=units, temperature=temperature, name=name, driven=driven
+            )
         )
 
     for role, paths in files.items():

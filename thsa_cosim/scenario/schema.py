@@ -11,7 +11,8 @@ from pydantic_core import PydanticCustomError
 from thsa_cosim.errors import did_you_mean
 from thsa_cosim.laws import FORMS
 from thsa_cosim.scenario.recording_schema import RecordingsTable, TemperatureTable
-from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order
+from thsa_cosim.scenario.system_schema import ModelTable
+from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order, check_pairs
 from thsa_cosim.search.strategies import SearchMethod, Strategy
 
 
@@ -149,10 +150,7 @@ class CostTable(Table):
     @field_validator("mask")
     @classmethod
     def _mask(cls, mask: list[list[float]]) -> list[list[float]]:
-        for pair in mask:
-            if len(pair) != 2 or not pair[0] < pair[1]:
-                raise PydanticCustomError("mask", "must hold pairs [from, to] in s with from below to")
-        return mask
+        return check_pairs(mask)
 
 
 class EvolutionTable(Table):
@@ -224,15 +222,13 @@ class ForceTable(Table):
     """s after which the motion repeats; what its laps differ by is printed beside the residual."""
 
 
-class CommonTable(Table):
+class CommonTable(ModelTable):
     """Keys of every kind that runs an FMU against recordings."""
 
     kind: str
     """What to do: the command of that name runs it."""
     title: str = ""
     """Shown in tables, plots and ``result.json``."""
-    fmu: Name
-    """Path of the FMU. ``--fmu`` replaces it."""
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
     """Of the search; the same seed repeats a study exactly. ``--seed`` replaces it."""
     recordings: RecordingsTable

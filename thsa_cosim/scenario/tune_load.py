@@ -8,13 +8,14 @@ import numpy as np
 from pydantic import ValidationError
 
 from thsa_cosim.errors import InputError, MissingExtraError, ScenarioError, UnitError, did_you_mean
-from thsa_cosim.fmu import FmuDescription, Variable, read_description
+from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.scenario import check
 from thsa_cosim.scenario.model import SearchSpec, SimulationSpec
 from thsa_cosim.scenario.schema import KINDS
 from thsa_cosim.scenario.sentences import from_validation, one_line
 from thsa_cosim.scenario.source import Source, about_kind, read_source
+from thsa_cosim.scenario.system import open_model
 from thsa_cosim.scenario.tune_drawn import line_spec, pareto_spec, surface_spec
 from thsa_cosim.scenario.tune_model import (
     LOOP_METRICS,
@@ -60,7 +61,7 @@ def load_tune(source: Source, *, seed: int | None = None, fmu: Path | str | None
     except ValidationError as error:
         raise from_validation(path, data, error) from None
     try:
-        return _resolve(path, table, seed, read_description(fmu or path.parent / table.fmu))
+        return _resolve(path, table, seed, open_model(path, table, fmu))
     except InputError as error:
         message = str(error) if str(path) in str(error) else f"{path}: {error}"
         raise type(error)(one_line(message)) from None

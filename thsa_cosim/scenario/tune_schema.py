@@ -7,6 +7,7 @@ from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from thsa_cosim.scenario.schema import EvolutionTable, SimulationTable
+from thsa_cosim.scenario.system_schema import ModelTable
 from thsa_cosim.scenario.table import Moderate, Name, NotNegative, Positive, Share, Table
 
 
@@ -279,15 +280,13 @@ class SurfaceTable(Table):
     """Along each."""
 
 
-class TuneTable(Table):
+class TuneTable(ModelTable):
     """``kind = "tune"``: find gains for commands and conditions that the scenario describes itself."""
 
     kind: Literal["tune"]
     """``"tune"``."""
     title: str = ""
     """Shown in tables and plots."""
-    fmu: Name
-    """Path of the FMU. ``--fmu`` replaces it."""
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
     """Of the search and of the parameter samples. ``--seed`` replaces it."""
     parameter_set: Name | None = None

@@ -1,0 +1,198 @@
+"""SSP archives: written, read back, nested, and refused in one sentence."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmu_sources import build
+
+from system.test_coupled import RING, TIME, VALUES, ring
+from thsa_cosim.errors import FmuError
+from thsa_cosim.fmu.description import DefaultExperiment
+from thsa_cosim.fmu.scratch import ScratchFolder
+from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.system import open_plant, read_description, unpack
+from thsa_cosim.system.assemble import Part, Wire, assemble
+from thsa_cosim.system.write import write_ssp
+
+FMUS = Path(__file__).parents[2] / "fmus"
+HEAD = (
+    '<ssd:SystemStructureDescription xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"'
+    ' xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"'
+    ' xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"'
+    ' xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping" version="1.0" name="nested">'
+)
+CONNECTORS = (
+    '<ssd:Connectors><ssd:Connector name="u" kind="input"><ssc:Real/></ssd:Connector>'
+    '<ssd:Connector name="y" kind="output"><ssc:Real/></ssd:Connector></ssd:Connectors>'
+)
+INNER = (
+    f'<ssd:System name="inner">{CONNECTORS}'
+    '<ssd:ParameterBindings><ssd:ParameterBinding source="resources/slow.ssv">'
+    '<ssd:ParameterMapping><ssm:ParameterMapping version="1.0">'
+    '<ssm:MappingEntry source="time constant" target="slow.tau">'
+    '<ssc:LinearTransformation factor="0.001"/></ssm:MappingEntry>'
+    "</ssm:ParameterMapping></ssd:ParameterMapping></ssd:ParameterBinding></ssd:ParameterBindings>"
+    f'<ssd:Elements><ssd:Component name="slow" source="resources/lag.fmu">{CONNECTORS}'
+    '<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version="1.0" name="p">'
+    '<ssv:Parameters><ssv:Parameter name="k"><ssv:Real value="-2"/></ssv:Parameter></ssv:Parameters>'
+    "</ssv:ParameterSet></ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings>"
+    "</ssd:Component></ssd:Elements><ssd:Connections>"
+    '<ssd:Connection startConnector="u" endElement="slow" endConnector="u"/>'
+    '<ssd:Connection startElement="slow" startConnector="y" endConnector="y"/>'
+    "</ssd:Connections></ssd:System>"
+)
+NESTED = (
+    f'{HEAD}<ssd:System name="outer"><ssd:Connectors><ssd:Connector name="shown" kind="output"><ssc:Real/>'
+    "</ssd:Connector></ssd:Connectors><ssd:Elements>"
+    f'<ssd:Component name="fast" source="resources/lag.fmu">{CONNECTORS}</ssd:Component>'
+    f"{INNER}</ssd:Elements><ssd:Connections>"
+    '<ssd:Connection startElement="fast" startConnector="y" endElement="inner" endConnector="u"/>'
+    '<ssd:Connection startElement="inner" startConnector="y" endElement="fast" endConnector="u">'
+    '<ssc:LinearTransformation factor="1" offset="1"/></ssd:Connection>'
+    '<ssd:Connection startElement="inner" startConnector="y" endConnector="shown"/>'
+    "</ssd:Connections></ssd:System></ssd:SystemStructureDescription>"
+)
+SSV = (
+    '<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" version="1.0" name="s">'
+    '<ssv:Parameters><ssv:Parameter name="time constant"><ssv:Real value="200"/></ssv:Parameter></ssv:Parameters>'
+    "</ssv:ParameterSet>"
+)
+
+
+def archive(path: Path, structure: str = NESTED, **members: str) -> Path:
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("SystemStructure.ssd", structure)
+        file.write(build.lag2(), "resources/lag.fmu")
+        file.writestr("resources/slow.ssv", SSV)
+        for name, text in members.items():
+            file.writestr(name.replace("__", "/"), text)
+    return path
+
+
+def simulated(
+    path: Path,
+    output: str,
+    values: dict[str, float],
+    time: FloatArray = TIME,
+    rates: dict[str, float] | None = None,
+) -> FloatArray:
+    """One output over ``time``; ``rates``: slopes of inputs that rise from zero."""
+    inputs = (
+        Signals(time, {n: r * time for n, r in rates.items()}, dict.fromkeys(rates, "1")) if rates else None
+    )
+    scratch = ScratchFolder()
+    try:
+        unpack(path, scratch.path / "system")
+        with open_plant(read_description(path), scratch.path / "system") as plant:
+            return plant.run(values, inputs, [output], time, tolerance=1e-9)[output]
+    finally:
+        scratch.remove()
+
+
+def test_a_nested_system_with_bindings_mapping_and_transformation_is_the_flat_one(tmp_path: Path) -> None:
+    found = simulated(archive(tmp_path / "nested.ssp"), "shown", {"fast.tau": VALUES["fast.tau"]})
+    assert np.max(np.abs(found - ring(TIME)[:, 1])) < 1e-7
+
+
+def test_a_written_system_is_read_back_and_written_the_same(tmp_path: Path) -> None:
+    parts = [Part("fast", build.lag2()), Part("slow", build.lag3(), "sampled", 0.01, 0.005, {"k": 3.0})]
+    system, archives = assemble("ring", parts, RING, {"y": ["slow.y"]})
+    path = write_ssp(system, archives, tmp_path / "a.ssp", DefaultExperiment(0.0, 2.0))
+    description = read_description(path)
+    again = description.system  # type: ignore[attr-defined]
+    assert [(c.name, c.execution, c.step, c.delay, dict(c.start)) for c in again.components] == [
+        ("fast", "continuous", None, 0.0, {}),
+        ("slow", "sampled", 0.01, 0.005, {"k": 3.0}),
+    ]
+    assert set(again.connections) == set(system.connections)
+    assert again.connectors == system.connectors
+    assert description.default_experiment == DefaultExperiment(0.0, 2.0)
+    twin = write_ssp(again, archives, tmp_path / "b.ssp", description.default_experiment)
+    assert twin.read_bytes() == path.read_bytes()
+
+
+def test_fmpy_reads_and_runs_what_we_write(tmp_path: Path) -> None:
+    from fmpy.ssp.simulation import simulate_ssp
+
+    plant, controller = Part("plant", FMUS / "Plant.fmu"), Part("controller", FMUS / "Controller.fmu")
+    wires = [Wire("controller.i_ref", "plant.i_ref"), Wire("plant.w_m", "controller.w_m")]
+    system, archives = assemble(
+        "THSA", [controller, plant], wires, {"v_cmd": ["controller.v_cmd"], "v": ["plant.v"]}
+    )
+    path = write_ssp(system, archives, tmp_path / "thsa.ssp", DefaultExperiment(0.0, 0.2))
+    step = 5e-4
+    with np.errstate(all="ignore"):
+        found = simulate_ssp(
+            str(path), stop_time=0.2, step_size=step, input={"v_cmd": lambda time: 0.03 * time}
+        )
+    ours = simulated(path, "v", {}, np.arange(0.0, 0.2, step), {"v_cmd": 0.03})
+    theirs = np.interp(np.arange(0.0, 0.2, step), found["time"] + step, found["plant.v"])
+    assert np.max(np.abs(theirs - ours)) < 0.03 * np.max(np.abs(ours))
+
+
+SECOND_WRITER = '<ssd:Connection startElement="fast" startConnector="y" endElement="fast" endConnector="u"/>'
+END = "</ssd:Connections></ssd:System></ssd:SystemStructureDescription>"
+WRONG = [
+    ("resources/lag.fmu", "resources/other.fmu", "holds no resources/other.fmu, which a component names"),
+    ('endElement="inner"', 'endElement="iner"', "there is no element 'iner'. Did you mean 'inner'?"),
+    (
+        'startElement="fast" startConnector="y"',
+        'startElement="fast" startConnector="yy"',
+        "has no variable 'yy'",
+    ),
+    (END, SECOND_WRITER + END, "fast.u has two writers"),
+    ('source="resources/slow.ssv"', 'source="resources/none.ssv"', "holds no resources/none.ssv"),
+    ('name="k"', 'name="kk"', "has no variable 'kk'"),
+    ('source="time constant"', 'source="tau"', "a parameter mapping names 'tau', which its values lack"),
+    ('factor="1"', 'factor="one"', "a factor is 'one', which is no number"),
+    ("</ssd:SystemStructureDescription>", "", "is no valid XML"),
+    ('Connection startConnector="u"', 'Connection startConnector="w"', "there is no connector 'w'"),
+]
+
+
+@pytest.mark.parametrize(("right", "wrong", "sentence"), WRONG, ids=[w[2][:30] for w in WRONG])
+def test_what_is_wrong_with_an_archive_is_one_sentence(
+    tmp_path: Path, right: str, wrong: str, sentence: str
+) -> None:
+    assert right in NESTED
+    path = archive(tmp_path / "wrong.ssp", NESTED.replace(right, wrong))
+    with pytest.raises(FmuError) as caught:
+        read_description(path)
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_a_system_that_contains_itself_is_refused(tmp_path: Path) -> None:
+    structure = NESTED.replace("resources/lag.fmu", "inner.ssd", 1)
+    path = archive(tmp_path / "cycle.ssp", structure, **{"inner.ssd": structure})
+    with pytest.raises(FmuError, match=r"inner\.ssd contains itself"):
+        read_description(path)
+
+
+@pytest.mark.parametrize(
+    ("parts", "wires", "connectors", "sentence"),
+    [
+        ([("a", {})], [("a.y", "b.u")], {}, "'b.u' names no component of the system"),
+        ([("a", {})], [("a.u", "a.u")], {}, "its source is an input variable"),
+        ([("a", {})], [("a.y", "a.tau")], {}, "a.tau is no input"),
+        ([("a", {}), ("b", {})], [("a.y", "b.u"), ("a.feed", "b.u")], {}, "b.u has two writers"),
+        ([("a", {}), ("b", {})], [("a.y", "b.u")], {"x": ["b.u"]}, "b.u has two writers"),
+        ([("a", {"execution": "sampled"})], [], {}, "give it a positive step"),
+        ([("a", {"execution": "sampled", "step": 0.1, "delay": 0.2})], [], {}, "exceeds its step"),
+        ([("a", {"start": {"taw": 1.0}})], [], {}, "has no variable 'taw'"),
+        ([("a", {})], [], {"out": ["a.y", "a.feed"]}, "has 2 sources"),
+    ],
+)
+def test_what_is_wrong_with_a_system_is_one_sentence(parts, wires, connectors, sentence) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(FmuError) as caught:
+        assemble("s", [Part(n, build.lag2(), **o) for n, o in parts], [Wire(*w) for w in wires], connectors)
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_units_that_do_not_convert_are_refused() -> None:
+    with pytest.raises(FmuError, match=r"connection a\.steps -> |connection a\.tau"):
+        assemble("s", [Part("a", build.lag2()), Part("b", build.lag2())], [Wire("a.tau", "b.u")], {})

@@ -1,0 +1,42 @@
+"""What a scenario simulates, opened: an FMU, an SSP archive, or the system of its own tables."""
+
+from pathlib import Path
+
+from thsa_cosim.errors import ScenarioError
+from thsa_cosim.fmu import FmuDescription
+from thsa_cosim.scenario.system_schema import ModelTable
+from thsa_cosim.system import read_description
+from thsa_cosim.system.assemble import Part, Wire, assembled
+
+
+def open_model(
+    path: Path, table: ModelTable, replaced_by: FmuDescription | Path | str | None = None
+) -> FmuDescription:
+    """Return the description of what the scenario ``path`` runs; ``replaced_by``: an FMU or system instead.
+
+    Raises ScenarioError or FmuError in one sentence.
+    """
+    if isinstance(replaced_by, FmuDescription):
+        return replaced_by
+    if replaced_by is not None:
+        return read_description(replaced_by)
+    if table.fmu:
+        return read_description(path.parent / table.fmu)
+    parts = [
+        Part(
+            c.name,
+            path.parent / c.fmu,
+            c.execution,
+            c.step,
+            c.delay,
+            {k: float(v) for k, v in c.start.items()},
+        )
+        for c in table.components
+    ]
+    names = [part.name for part in parts]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ScenarioError(f"components: two are named {twice!r}; give each its own name.")
+    wires = [Wire(c.source, c.target, c.factor, c.offset) for c in table.connections]
+    pins = {name: [given] if isinstance(given, str) else given for name, given in table.connectors.items()}
+    return read_description(assembled(path.stem, parts, wires, pins))

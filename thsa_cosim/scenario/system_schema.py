@@ -1,0 +1,63 @@
+"""What is simulated: one FMU or system archive by its path, or a system that the scenario describes itself."""
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from thsa_cosim.scenario.table import Moderate, Name, NotNegative, Positive, Table
+
+
+class ComponentTable(Table):
+    """``[[components]]``: one FMU of a system. Its variables are named ``<component>.<variable>``."""
+
+    name: Name
+    """Unique within the system."""
+    fmu: Name
+    """Path of the FMU; several components may name the same one."""
+    execution: Literal["continuous", "coupled", "sampled"] | None = None
+    """``continuous``: integrated together with the others (Model Exchange); ``coupled``: by its own solver, in
+    communication steps (Co-Simulation); ``sampled``: a controller that acts at its ticks only. Default: continuous
+    where the FMU offers Model Exchange and ``step`` is not given, else coupled."""
+    step: Positive | None = None
+    """Communication step or sampling interval, s. Default for a coupled component: what its FMU suggests."""
+    delay: NotNegative = 0.0
+    """Time from a tick of a sampled component until its outputs change, s; at most one step."""
+    start: dict[Name, float | bool] = Field(default_factory=dict)
+    """Start values by variable of this FMU, in its units."""
+
+
+class ConnectionTable(Table):
+    """``[[connections]]``: an output of one component to an input of another; units are converted."""
+
+    source: Name = Field(alias="from")
+    """``<component>.<output>``."""
+    target: Name = Field(alias="to")
+    """``<component>.<input>``; one writer for each."""
+    factor: Moderate = 1.0
+    """input = factor * output + offset, before units are converted."""
+    offset: Moderate = 0.0
+    """In the output's unit, times ``factor``."""
+
+
+class ModelTable(Table):
+    """What every kind runs."""
+
+    fmu: Name = ""
+    """Path of the FMU, or of a system of FMUs (SSP archive, ``.ssp``). ``--fmu`` replaces it."""
+    components: list[ComponentTable] = Field(default_factory=list)
+    """The FMUs of a system, in place of ``fmu``."""
+    connections: list[ConnectionTable] = Field(default_factory=list)
+    """How they are connected. Inputs that nothing is connected to are inputs of the system."""
+    connectors: dict[Name, Name | list[Name]] = Field(default_factory=dict)
+    """Short names for variables of components: ``v = "plant.v"``; one name may drive several inputs."""
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> "ModelTable":
+        if self.fmu and self.components:
+            raise PydanticCustomError("model", "fmu and components exclude each other; remove one")
+        if not self.fmu and not self.components:
+            raise PydanticCustomError("model", "fmu: is missing; add it, or [[components]] of a system")
+        if not self.components and (self.connections or self.connectors):
+            raise PydanticCustomError("model", "connections and connectors need [[components]]; add them")
+        return self

@@ -1,0 +1,407 @@
+"""A system as one instance: the integrator sees one vector of states, one of event indicators, one event iteration.
+
+Model Exchange components are integrated together, their connections exact at every call of the right-hand side;
+Co-Simulation components act at time events of the whole (see ``stepped``).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thsa_cosim.fmu.description import FmuDescription, Variable
+from thsa_cosim.fmu.failure import SimulationFailure, Status
+from thsa_cosim.fmu.fmi2 import Fmi2Instance
+from thsa_cosim.fmu.fmi3 import Fmi3Instance
+from thsa_cosim.fmu.instance import Channel, EventInfo, Instance
+from thsa_cosim.fmu.native import Messages, MessageSink
+from thsa_cosim.fmu.point import Point
+from thsa_cosim.signals import FloatArray
+from thsa_cosim.system.description import SystemDescription
+from thsa_cosim.system.stepped import Stepped
+from thsa_cosim.system.wiring import Port, Wiring
+
+_EVENT_ITERATIONS = 100
+_VECTORS = {"GetContinuousStates", "GetNominalsOfContinuousStates", "GetEventIndicators"}
+
+
+class SystemInstance(Instance):
+    """One live instance of every component of a system; every failing call names its component."""
+
+    prefix = "fmi2"  # it serves what FMI 2.0 Model Exchange has
+    types: ClassVar[dict[str, tuple[str, Any]]] = Fmi2Instance.types | Fmi3Instance.types
+
+    def __init__(
+        self, folder: Path, description: SystemDescription, kind: str, sink: MessageSink | None = None
+    ) -> None:
+        """``folder``: the unpacked archive, in which each component has ``components/<name>``."""
+        self.description: FmuDescription = description
+        self._system, self._pins = description.system, description.pins
+        self.kind, self.messages, self.handle, self.is_dead = kind, Messages(sink), 0, False
+        self.parts: dict[str, Instance] = {}
+        for component in self._system.components:
+            fmu = component.fmu
+            cls = Fmi2Instance if fmu.fmi_version == "2.0" else Fmi3Instance
+            how = "model-exchange" if component.execution == "continuous" else "co-simulation"
+            part = cls(folder / "components" / component.name, fmu, how, sink)
+            part.messages = self.messages
+            self.parts[component.name] = part
+        self._continuous = [c.name for c in self._system.components if c.execution == "continuous"]
+        self._slices = _slices([self.parts[n].description.states for n in self._continuous])
+        self._indicators = _slices([self.parts[n].description.event_indicators for n in self._continuous])
+        self._others = [c for c in self._system.components if c.execution != "continuous"]
+        self._wiring = Wiring(self._system, self.parts, [c.name for c in self._others])
+        # At one instant, what has to catch up with it goes first, then what samples there.
+        order = sorted(self._others, key=lambda c: c.execution == "sampled")
+        self._stepped = [Stepped(c, self.parts[c.name], self._wiring, self._driven(c.name)) for c in order]
+        self._time = 0.0
+        self._ports: dict[tuple[str, tuple[str, ...]], Port] = {}
+
+    def _driven(self, name: str) -> list[str]:
+        """Inputs of a stepped component that come from outside the system."""
+        connected = {pin for pin in self._wiring.targets if pin[0] == name}
+        return [v.name for v in self.parts[name].description.inputs if (name, v.name) not in connected]
+
+    # -- life ---------------------------------------------------------------------------------------
+    def instantiate(self) -> None:
+        """Instantiate every component and give it its own start values."""
+        for component in self._system.components:
+            part = self.parts[component.name]
+            with _named(component.name):
+                part.instantiate()
+                if component.start:
+                    variables = [part.description.variable(n) for n in component.start]
+                    values = np.array(list(component.start.values()), dtype=np.float64)
+                    part.set_values(part.channels(variables), values)
+        self.handle = 1
+
+    def initialize_begin(self, start: float, stop: float, tolerance: float | None) -> None:
+        """Bring every component into Initialization Mode."""
+        self._time = start
+        for component in self._system.components:
+            # A step that begins before the end may go beyond it.
+            beyond = 2.0 * (component.step or 0.0)
+            with _named(component.name):
+                self.parts[component.name].initialize_begin(start, stop + beyond, tolerance)
+
+    def initialize_end(self) -> None:
+        """Settle the connections and leave Initialization Mode."""
+        self._first_guess()
+        self._wiring.propagate(self._time, events=True)
+        self._write_stepped()
+        for name, part in self.parts.items():
+            with _named(name):
+                part.initialize_end()
+        for stepped in self._stepped:
+            stepped.begin(self._time)
+            stepped.put(self._time)
+
+    def _first_guess(self) -> None:
+        """Outputs of stepped components as their start values give them."""
+        for stepped in self._stepped:
+            stepped.begin(self._time)
+            stepped.put(self._time)
+
+    def _write_stepped(self) -> None:
+        for stepped in self._stepped:
+            stepped.write_inputs()
+
+    def terminate(self) -> None:
+        """End the run in every component."""
+        for part in self.parts.values():
+            part.terminate()
+
+    def reset(self) -> None:
+        """Bring every component back to the state after instantiation."""
+        for part in self.parts.values():
+            part.reset()
+
+    def free(self) -> None:
+        """Destroy every instance that lives."""
+        for part in self.parts.values():
+            part.free()
+        self.handle = 0
+
+    # -- variables ------------------------------------------------------------------------------------
+    def channels(self, variables: Sequence[Variable]) -> list[Channel]:
+        """One channel for everything: its references are value references of the system."""
+        if not variables:
+            return []
+        for variable in variables:
+            for (name, own), *_ in self._pins[variable.name]:
+                self.parts[name].channels([self.parts[name].description.variable(own)])  # a number?
+        references = np.array([v.value_reference for v in variables], dtype=np.uint32)
+        return [Channel("System", references, np.dtype(np.float64), tuple(range(len(variables))))]
+
+    def set_values(self, channels: Sequence[Channel], values: FloatArray) -> None:
+        """Set variables of components through the names of the system."""
+        for channel in channels:
+            for reference, column in zip(channel.references.tolist(), channel.columns, strict=True):
+                for (name, own), factor, offset in self._pins[self._name(reference)]:
+                    self._set(name, own, factor * float(values[column]) + offset)
+
+    def get_values(self, channels: Sequence[Channel], out: FloatArray) -> None:
+        """Read variables of components through the names of the system."""
+        for channel in channels:
+            for reference, column in zip(channel.references.tolist(), channel.columns, strict=True):
+                name = self._name(reference)
+                (part, own), factor, offset = self._pins[name][0]
+                value = np.empty(1)
+                self._port(part, own).read(value)
+                is_input = self.description.variables[name].causality == "input"
+                out[column] = (value[0] - offset) / factor if is_input else factor * value[0] + offset
+
+    def _name(self, reference: int) -> str:
+        if not hasattr(self, "_names"):
+            self._names = list(self.description.variables)
+        return self._names[reference]
+
+    def _port(self, part: str, variable: str) -> Port:
+        key = (part, (variable,))
+        if key not in self._ports:
+            self._ports[key] = Port(self.parts[part], [variable], [0])
+        return self._ports[key]
+
+    def _set(self, part: str, variable: str, value: float) -> None:
+        for stepped in self._stepped:
+            if stepped.component.name == part and stepped.drive(variable, value):
+                return
+        with _named(part):
+            self._port(part, variable).write(np.array([value]))
+
+    # -- Model Exchange -------------------------------------------------------------------------------
+    def point(self, input_channels: Sequence[Channel]) -> Point:
+        """The system as the integrator sees it."""
+        return SystemPoint(self, input_channels)
+
+    def move_to(self, time: float) -> None:
+        """Extrapolate the outputs of stepped components to ``time``."""
+        self._time = time
+        for stepped in self._stepped:
+            stepped.put(time)
+
+    def propagate(self, *, events: bool = False) -> None:
+        """Bring all connections up to date."""
+        self._wiring.propagate(self._time, events=events)
+
+    def set_time(self, time: float) -> None:
+        """Set the independent variable of every integrated component [s]."""
+        self.move_to(time)
+        for name in self._continuous:
+            self.parts[name].set_time(time)
+
+    def enter_event_mode(self) -> None:
+        """Bring every integrated component into Event Mode."""
+        for name in self._continuous:
+            with _named(name):
+                self.parts[name].enter_event_mode()
+
+    def enter_continuous_time_mode(self) -> None:
+        """Bring every integrated component into Continuous-Time Mode."""
+        for name in self._continuous:
+            with _named(name):
+                self.parts[name].enter_continuous_time_mode()
+
+    def event_iteration(self) -> EventInfo:
+        """Let stepped components act, then iterate events and connections until nothing changes."""
+        self._act()
+        needs = terminate = nominals = states = False
+        following: float | None = None
+        for _ in range(_EVENT_ITERATIONS):
+            before = self._wiring.values.copy()
+            self.propagate(events=True)
+            needs, following = False, None
+            for name in self._continuous:
+                with _named(name):
+                    info = self.parts[name].event_iteration()
+                needs |= info.needs_update
+                terminate |= info.terminate
+                nominals |= info.nominals_changed
+                states |= info.states_changed
+                if info.next_event_time is not None:
+                    following = min(following or np.inf, info.next_event_time)
+            self.propagate(events=True)
+            if terminate or (not needs and np.array_equal(before, self._wiring.values)):
+                break
+        else:
+            raise SimulationFailure(
+                Status.FMI_ERROR, "the event iteration of the system does not come to an end"
+            )
+        for stepped in self._stepped:
+            following = min(np.inf if following is None else following, stepped.next_time)
+        return EventInfo(False, terminate, nominals, states, following)
+
+    def _act(self) -> None:
+        """Step what is due, in the order of the components, each seeing what the ones before it have found."""
+        acted = []
+        for stepped in self._stepped:
+            self.propagate(events=True)
+            with _named(stepped.component.name):
+                if stepped.act(self._time):
+                    acted.append(stepped)
+            stepped.put(self._time)
+        if acted:
+            self.propagate(events=True)
+        for stepped in acted:
+            stepped.settle()
+
+    def completed_integrator_step(self) -> tuple[bool, bool]:
+        """Tell every integrated component; (enter event mode, terminate) if any asks for it."""
+        event = terminate = False
+        for name in self._continuous:
+            part = self.parts[name]
+            if part.description.capabilities.get("needsCompletedIntegratorStep", True):
+                with _named(name):
+                    wants, ends = part.completed_integrator_step()
+                event |= wants
+                terminate |= ends
+        return event, terminate
+
+    def vector(self, name: str, values: FloatArray) -> None:
+        """Read a vector of all integrated components, one after the other."""
+        assert name in _VECTORS
+        for part, where in zip(
+            self._continuous,
+            self._indicators if name == "GetEventIndicators" else self._slices,
+            strict=True,
+        ):
+            piece = np.zeros(where.stop - where.start)
+            if len(piece):
+                with _named(part):
+                    self.parts[part].vector(name, piece)
+            values[where] = piece
+
+    def place_states(self, time: float, states: FloatArray) -> None:
+        """Set time and states of every integrated component."""
+        self.move_to(time)
+        for name, where in zip(self._continuous, self._slices, strict=True):
+            part = self.parts[name]
+            part.set_time(time)
+            if where.stop > where.start:
+                part.vector("SetContinuousStates", np.ascontiguousarray(states[where]))
+
+    def derivatives(self, out: FloatArray) -> None:
+        """Write dx/dt of every integrated component."""
+        for name, where in zip(self._continuous, self._slices, strict=True):
+            part = self.parts[name]
+            if where.stop > where.start:
+                piece = np.empty(where.stop - where.start)
+                verb = "GetDerivatives" if part.prefix == "fmi2" else "GetContinuousStateDerivatives"
+                part.vector(verb, piece)
+                out[where] = piece
+
+    # -- Jacobian -------------------------------------------------------------------------------------
+    @property
+    def has_jacobian(self) -> bool:
+        """Whether every integrated component offers directional derivatives of what is needed."""
+        return bool(
+            self.description.states and self.description.capabilities["providesDirectionalDerivative"]
+        )
+
+    def jacobian(self, out: FloatArray) -> None:
+        """df/dx = A + B G (I - D G)^-1 C, from the components' own derivatives and the connections."""
+        sources, targets = self._wiring.sources, self._wiring.targets
+        n, s, m = self.description.states, len(sources), len(targets)
+        a, b = np.zeros((n, n)), np.zeros((n, m))
+        c, d = np.zeros((s, n)), np.zeros((s, m))
+        for name, where in zip(self._continuous, self._slices, strict=True):
+            description = self.parts[name].description
+            pairs = np.array(description.state_references, dtype=np.uint32).reshape(-1, 2)
+            rows = [k for k, pin in enumerate(sources) if pin[0] == name]
+            outputs = [description.variable(sources[k][1]).value_reference for k in rows]
+            unknowns = np.array([*pairs[:, 1].tolist(), *outputs], dtype=np.uint32)
+            columns = [k for k, pin in enumerate(targets) if pin[0] == name and self._is_float(pin)]
+            inputs = [description.variable(targets[k][1]).value_reference for k in columns]
+            states = list(range(where.start, where.stop))
+            for knowns, places, of_states, of_outputs in (
+                (pairs[:, 0].tolist(), states, a, c),
+                (inputs, columns, b, d),
+            ):
+                for known, place in zip(knowns, places, strict=True):
+                    slope = np.empty(len(unknowns))
+                    one = np.array([known], dtype=np.uint32)
+                    self.parts[name].directional_derivative(unknowns, one, slope)
+                    of_states[where, place] = slope[: len(pairs)]
+                    of_outputs[rows, place] = slope[len(pairs) :]
+        gain = np.zeros((m, s))
+        gain[np.arange(m), self._wiring.feeds] = self._wiring.factor
+        out[:] = a + b @ gain @ np.linalg.solve(np.eye(s) - d @ gain, c) if s else a
+
+    def _is_float(self, pin: tuple[str, str]) -> bool:
+        return self.parts[pin[0]].description.variable(pin[1]).is_float
+
+    # -- what a system does not have --------------------------------------------------------------------
+    def do_step(self, time: float, step: float) -> None:
+        """A system is integrated by us."""
+        raise NotImplementedError
+
+    def value_function(self, verb: str, suffix: str) -> Any:
+        """A system has no C functions of its own."""
+        raise NotImplementedError
+
+    def access(self, function: Any, references: int, count: int, values: int) -> int:
+        """A system has no C functions of its own."""
+        raise NotImplementedError
+
+    def directional_derivative(
+        self, unknowns: NDArray[np.uint32], known: NDArray[np.uint32], out: FloatArray
+    ) -> None:
+        """Derivatives of a system come as its whole Jacobian."""
+        raise NotImplementedError
+
+
+class SystemPoint:
+    """The point of a system; see ``thsa_cosim.fmu.point.Point``."""
+
+    def __init__(self, instance: SystemInstance, input_channels: Sequence[Channel]) -> None:
+        self._instance = instance
+        self._channels = _continuous_only(instance, input_channels)
+        self._dx = np.zeros(instance.description.states)
+
+    def place(self, time: float, states: FloatArray, inputs: FloatArray) -> None:
+        """Set time, states and inputs, then bring the connections up to date."""
+        self._instance.place_states(time, states)
+        self._instance.set_values(self._channels, inputs)
+        self._instance.propagate()
+
+    def derivatives(self, time: float) -> FloatArray:
+        """Return dx/dt."""
+        del time
+        self._instance.derivatives(self._dx)
+        return self._dx
+
+
+def _continuous_only(instance: SystemInstance, channels: Sequence[Channel]) -> list[Channel]:
+    variables = list(instance.description.variables.values())
+    found = []
+    for channel in channels:
+        keep = [
+            i
+            for i, reference in enumerate(channel.references.tolist())
+            if variables[reference].is_float and variables[reference].variability == "continuous"
+        ]
+        columns = tuple(channel.columns[i] for i in keep)
+        found.append(replace(channel, references=channel.references[keep], columns=columns))
+    return [channel for channel in found if len(channel.references)]
+
+
+def _slices(sizes: Sequence[int]) -> list[slice]:
+    ends = np.cumsum([0, *sizes]).tolist()
+    return [slice(a, b) for a, b in pairwise(ends)]
+
+
+class _named:
+    """Put the component's name before what a failure says."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, _kind: Any, error: BaseException | None, _trace: Any) -> None:
+        if isinstance(error, SimulationFailure):
+            raise SimulationFailure(error.status, f"component {self._name}: {error.reason}") from error

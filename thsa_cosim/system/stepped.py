@@ -1,0 +1,131 @@
+"""Components that go on by Co-Simulation, at communication steps or ticks of their own.
+
+``coupled``: at t_k+1 the component steps from t_k with the mean of its inputs at both ends (second order in the step,
+as in ``thsa_cosim.fmu.inputs``); between its steps the others see its outputs extrapolated linearly, which again is of
+second order. ``sampled``: at its tick t_k a controller takes its inputs as they are, and its outputs change at once
+(or ``delay`` later) and are held; so a continuous PI that is exported as Co-Simulation becomes its sampled form.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from thsa_cosim.fmu.instance import Instance
+from thsa_cosim.signals import FloatArray
+from thsa_cosim.system.structure import Component
+from thsa_cosim.system.wiring import Port, Wiring
+
+_TIME = 1e-9
+"""Ticks closer than this share of a step are one."""
+
+
+class Stepped:
+    """One Co-Simulation component between its steps."""
+
+    def __init__(
+        self, component: Component, instance: Instance, wiring: Wiring, driven: Sequence[str]
+    ) -> None:
+        """``driven``: its inputs that come from outside the system."""
+        assert component.step is not None
+        self.component, self.instance = component, instance
+        self._wiring, self._step = wiring, component.step
+        columns = [k for k, pin in enumerate(wiring.targets) if pin[0] == component.name]
+        self._targets = np.array(columns, dtype=np.intp)
+        names = [wiring.targets[k][1] for k in columns]
+        self._inputs = Port(instance, [*names, *driven], range(len(names) + len(driven)))
+        self._floats = np.array(
+            [instance.description.variable(n).is_float for n in (*names, *driven)], dtype=bool
+        )
+        self._sources = np.array(
+            [k for k, pin in enumerate(wiring.sources) if pin[0] == component.name], dtype=np.intp
+        )
+        self._outputs = Port(
+            instance, [wiring.sources[k][1] for k in self._sources], range(len(self._sources))
+        )
+        self._driven = list(driven)
+        self.outside = np.array(
+            [instance.description.variable(n).start or 0.0 for n in driven], dtype=np.float64
+        )
+        """Present values of ``driven``."""
+        self._ticks = 0
+        self._start = self._since = 0.0
+        self._before = np.zeros(len(names) + len(driven))
+        self._now = np.zeros(len(self._sources))
+        self._slope = np.zeros(len(self._sources))
+        self._waiting: tuple[float, FloatArray] | None = None
+
+    def begin(self, time: float) -> None:
+        """Take the state after initialisation."""
+        self._start = self._since = time
+        self._ticks = 0 if self.component.execution == "sampled" else 1
+        self._waiting = None
+        self._slope[:] = 0.0
+        self._now = self._read()
+        self._before = self._present()
+
+    def put(self, time: float) -> None:
+        """Put the outputs at ``time`` into the wiring's values."""
+        self._wiring.values[self._sources] = self._now + self._slope * (time - self._since)
+
+    @property
+    def next_time(self) -> float:
+        """When it acts next [s]."""
+        tick = self._start + self._ticks * self._step
+        return min(tick, self._waiting[0]) if self._waiting is not None else tick
+
+    def act(self, time: float) -> bool:
+        """Do what is due at ``time``; return whether its outputs may have changed."""
+        if time < self.next_time - _TIME * self._step:
+            return False
+        if self._waiting is not None and time >= self._waiting[0] - _TIME * self._step:
+            self._now, self._waiting = self._waiting[1], None
+        if time >= self._start + self._ticks * self._step - _TIME * self._step:
+            (self._sample if self.component.execution == "sampled" else self._follow)(time)
+        return True
+
+    def _sample(self, time: float) -> None:
+        self._inputs.write(self._present())
+        self._do_step(self._start + self._ticks * self._step)
+        self._ticks += 1
+        found = self._read()
+        if self.component.delay > 0.0:
+            self._waiting = (time + self.component.delay, found)
+        else:
+            self._now = found
+
+    def _follow(self, time: float) -> None:
+        present = self._present()
+        self._inputs.write(np.where(self._floats, 0.5 * (self._before + present), self._before))
+        self._do_step(self._start + (self._ticks - 1) * self._step)
+        self._inputs.write(present)  # outputs belong to the inputs here, also under direct feed-through
+        found = self._read()
+        is_first = self._ticks == 1
+        self._slope = np.zeros_like(found) if is_first else (found - self._now) / self._step
+        self._now, self._since = found, time
+        self._ticks += 1
+
+    def settle(self) -> None:
+        """Remember the inputs at this point, once everything that is due has acted."""
+        self._before = self._present()
+
+    def _present(self) -> FloatArray:
+        return np.concatenate((self._wiring.inputs()[self._targets], self.outside))
+
+    def _read(self) -> FloatArray:
+        found = np.empty(len(self._sources))
+        self._outputs.read(found)
+        return found
+
+    def _do_step(self, begin: float) -> None:
+        self.instance.do_step(begin, self._step)
+
+    def drive(self, variable: str, value: float) -> bool:
+        """Take a value for an input from outside the system; False if the variable is none of them."""
+        if variable not in self._driven:
+            return False
+        self.outside[self._driven.index(variable)] = value
+        return True
+
+    def write_inputs(self) -> None:
+        """Set the inputs to their present values (Initialization Mode)."""
+        self._inputs.write(self._present())

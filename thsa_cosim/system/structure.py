@@ -1,0 +1,219 @@
+"""What a system of FMUs is: components, connections between their variables, connectors to the outside.
+
+A variable of a component is named ``<component>.<variable>``; a connector of the system has a name of its own. Inputs
+that nothing is connected to are inputs of the system.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from thsa_cosim.errors import FmuError, UnitError, did_you_mean
+from thsa_cosim.fmu.description import FmuDescription, Variable
+from thsa_cosim.units import conversion
+
+Execution = Literal["continuous", "coupled", "sampled"]
+"""How a component goes on: integrated together with the others (Model Exchange), by communication steps of its own
+solver (Co-Simulation), or as a sampled controller, which acts at its ticks only (Co-Simulation)."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """One FMU in its place."""
+
+    name: str
+    """Unique; with dots where it stands in a nested system."""
+    fmu: FmuDescription
+    source: str
+    """Its archive's place in the SSP, e.g. ``resources/Plant.fmu``."""
+    execution: Execution
+    start: Mapping[str, float] = field(default_factory=dict)
+    """Start values by variable, in the FMU's units."""
+    step: float | None = None
+    """Communication step or sampling interval [s]; None for ``continuous``."""
+    delay: float = 0.0
+    """Time from a tick until a sampled component's outputs change [s], at most one ``step``."""
+
+
+@dataclass(frozen=True)
+class Connection:
+    """``target = factor * source + offset``; both are (component, variable)."""
+
+    source: tuple[str, str]
+    target: tuple[str, str]
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def __str__(self) -> str:
+        return f"{'.'.join(self.source)} -> {'.'.join(self.target)}"
+
+
+@dataclass(frozen=True)
+class Connector:
+    """A variable of the system itself: an input that drives inputs of components, or an output that shows one."""
+
+    name: str
+    causality: Literal["input", "output"]
+    pins: tuple[tuple[tuple[str, str], float, float], ...]
+    """((component, variable), factor, offset). Input: pin = factor * connector + offset; output (one pin):
+    connector = factor * pin + offset."""
+    unit: str = ""
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class System:
+    """Components and how they are connected; ``checked`` makes a sound one."""
+
+    name: str
+    components: tuple[Component, ...]
+    connections: tuple[Connection, ...]
+    connectors: tuple[Connector, ...] = ()
+
+    def component(self, name: str) -> Component:
+        """Return a component; FmuError if there is none of that name."""
+        for component in self.components:
+            if component.name == name:
+                return component
+        names = [c.name for c in self.components]
+        raise FmuError(
+            f"the system has no component {name!r}; it has {', '.join(names)}.{did_you_mean(name, names)}"
+        )
+
+    def variable(self, pin: tuple[str, str]) -> Variable:
+        """Return a component's variable; FmuError if there is none."""
+        try:
+            return self.component(pin[0]).fmu.variable(pin[1])
+        except FmuError as error:
+            raise FmuError(f"component {pin[0]!r}: {error}" if pin[0] else str(error)) from None
+
+
+def unit_conversion(source: Variable, target: Variable, where: str) -> tuple[float, float]:
+    """Return (factor, offset) from the unit of ``source`` to that of ``target``; FmuError if there is none."""
+    if not source.unit or not target.unit or source.unit == target.unit:
+        return 1.0, 0.0
+    try:
+        return conversion(source.unit, target.unit)
+    except UnitError as error:
+        raise FmuError(f"connection {where}: {error} Give the connection a factor instead.") from None
+
+
+def checked(system: System) -> System:
+    """Return the system with unit conversions in its connections; FmuError in one sentence if it is not sound.
+
+    Sound: names are unique and known, sources are outputs (or locals), targets are inputs with one writer each,
+    types go together, units convert, and every component has the interface and the step that it needs.
+    """
+    if not system.components:
+        raise FmuError("the system has no component.")
+    _unique([c.name for c in system.components], "component")
+    _unique([c.name for c in system.connectors], "connector")
+    for component in system.components:
+        _check_component(component)
+    writers: dict[tuple[str, str], str] = {}
+    connections = []
+    for connection in system.connections:
+        source, target = system.variable(connection.source), system.variable(connection.target)
+        if source.causality in ("input", "independent"):
+            raise FmuError(
+                f"connection {connection}: its source is an {source.causality} variable, not an output."
+            )
+        _claim(connection.target, target, str(connection), writers)
+        if source.is_float != target.is_float and source.is_float:
+            raise FmuError(
+                f"connection {connection}: {source.type} does not go into {target.type}; round it in a component."
+            )
+        factor, offset = unit_conversion(source, target, str(connection))
+        connections.append(
+            Connection(
+                connection.source,
+                connection.target,
+                connection.factor * factor,
+                connection.factor * offset + connection.offset,
+            )
+        )
+    connectors = tuple(_checked_connector(system, c, writers) for c in system.connectors)
+    return System(system.name, system.components, tuple(connections), connectors)
+
+
+def _unique(names: Sequence[str], what: str) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise FmuError(f"two {what}s are named {name!r}; give each its own name.")
+
+
+def _claim(
+    pin: tuple[str, str], variable: Variable, writer: str, writers: dict[tuple[str, str], str]
+) -> None:
+    name = ".".join(pin)
+    if variable.causality != "input":
+        raise FmuError(f"connection {writer}: {name} is no input but of causality {variable.causality!r}.")
+    if pin in writers:
+        raise FmuError(f"{name} has two writers, {writers[pin]} and {writer}; keep one.")
+    writers[pin] = writer
+
+
+def _checked_connector(
+    system: System, connector: Connector, writers: dict[tuple[str, str], str]
+) -> Connector:
+    pins = []
+    unit = connector.unit
+    for pin, factor, offset in connector.pins:
+        variable = system.variable(pin)
+        if connector.causality == "input":
+            _claim(pin, variable, f"connector {connector.name}", writers)
+        unit = unit or variable.unit or ""
+        scale, shift = 1.0, 0.0
+        if variable.unit and unit and variable.unit != unit:
+            pair = (unit, variable.unit) if connector.causality == "input" else (variable.unit, unit)
+            try:
+                scale, shift = conversion(*pair)
+            except UnitError as error:
+                raise FmuError(f"connector {connector.name} - {'.'.join(pin)}: {error}") from None
+        pins.append((pin, factor * scale, factor * shift + offset))
+    if connector.causality == "output" and len(pins) != 1:
+        raise FmuError(
+            f"the output connector {connector.name} has {len(pins)} sources; connect one output to it."
+        )
+    return Connector(connector.name, connector.causality, tuple(pins), unit, connector.description)
+
+
+def _check_component(component: Component) -> None:
+    fmu, name = component.fmu, component.name
+    if fmu.fmi_version == "1.0":
+        raise FmuError(f"component {name!r}: {fmu.path.name} is FMI 1.0; a system takes FMI 2.0 and 3.0.")
+    for variable in component.start:
+        fmu.variable(variable)
+    if component.execution == "continuous":
+        if not fmu.supports_model_exchange:
+            raise FmuError(
+                f"component {name!r}: {fmu.path.name} has no Model Exchange; give it a step to run it by Co-Simulation."
+            )
+        if component.step is not None or component.delay:
+            raise FmuError(
+                f"component {name!r} is integrated with the others; step and delay are for Co-Simulation."
+            )
+        return
+    if not fmu.supports_co_simulation:
+        raise FmuError(f"component {name!r}: {fmu.path.name} has no Co-Simulation; leave its step out.")
+    if component.step is None or not component.step > 0.0:
+        raise FmuError(f"component {name!r} runs by Co-Simulation: give it a positive step in s.")
+    if not 0.0 <= component.delay <= component.step:
+        raise FmuError(
+            f"component {name!r}: the delay of {component.delay:g} s exceeds its step of {component.step:g} s."
+        )
+    if component.delay and component.execution != "sampled":
+        raise FmuError(f"component {name!r}: only a sampled component has a delay.")
+
+
+def default_execution(fmu: FmuDescription, step: float | None) -> Execution:
+    """Integrate what offers Model Exchange and has no step of its own; step the rest."""
+    return "continuous" if fmu.supports_model_exchange and step is None else "coupled"
+
+
+def connected_inputs(system: System) -> frozenset[tuple[str, str]]:
+    """Return inputs of components that a connection or an input connector writes."""
+    pins: Iterable[tuple[str, str]] = (
+        pin for c in system.connectors if c.causality == "input" for pin, *_ in c.pins
+    )
+    return frozenset(c.target for c in system.connections) | frozenset(pins)

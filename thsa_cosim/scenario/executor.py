@@ -55,6 +55,7 @@ class Executor:
             "deadline_s": spec.deadline,
             "memory_limit_mb": spec.memory_mb,
             "reuse": spec.reuse,
+            "stepping": spec.stepping,
             "kind": settled.interface,
         }
         if self.address is None:

@@ -1,6 +1,7 @@
 """A study that runs: its place, claimed for what was asked, and the log of its runs."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -49,7 +50,7 @@ class Study:
     def open_runner(self, spec: SimulationSpec, experiments: Sequence[Experiment]) -> Runner:
         """Open the processes for ``experiments``; their outcomes are kept, and looked up."""
         # Deadline and memory decide whether a run is let finish, not what it gives.
-        settings = (spec.interface, spec.inputs, spec.reuse)
+        settings = replace(spec, deadline=0.0, memory_mb=None)
         return LoggedRunner(
             self.place.executor.open_runner(spec, experiments), self._log, experiments, settings
         )

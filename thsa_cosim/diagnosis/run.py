@@ -17,6 +17,7 @@ from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, values_of
+from thsa_cosim.diagnosis.choosing.orders import Machine, machine_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
@@ -98,8 +99,10 @@ def _diagnose(
     )
     with study.open_runner(scenario.simulation, [t.experiment for t in driven]) as runner:
         bench = Bench(runner, driven)
-        scan = wave_number_finder(bench, tested.slots, tested.signals_at)
         start = before.fit.vector
+        at_start = {t.case.name: unknowns.assignments(start, t.group) for t in driven if t.part == "fit"}
+        machine = machine_of(tested.slots, tested.signals_at(at_start))
+        scan = wave_number_finder(bench, tested.slots, tested.signals_at, machine)
         found = attribute(
             bench, unknowns, tested.candidates, scan, start=start, seed=scenario.seed, most=spec.most, say=say
         )
@@ -107,7 +110,9 @@ def _diagnose(
         reason = next(iter(bench.failures), "no run succeeded")
         raise StudyError(f"{scenario.path}: the model with all effects cannot be simulated: {reason}")
     names = tuple(effect.name for effect in effects)
-    return _Closing(scenario, spec, study, trials, unknowns, before, found, bench, names, box).result()
+    return _Closing(
+        scenario, spec, study, trials, unknowns, before, found, bench, names, machine, box
+    ).result()
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +128,7 @@ class _Closing:
     found: Attribution
     bench: Bench
     effects: tuple[str, ...]
+    machine: Machine
     box: BlackBox | None = None
 
     def result(self) -> DiagnosisResult:
@@ -186,7 +192,7 @@ class _Closing:
             fmu=scenario.fmu.path,
             fmu_sha256=scenario.fmu.sha256,
             verdict=verdict,
-            effects=found_effects(found, after.fit),
+            effects=found_effects(found, after.fit, self.machine),
             before=_errors(before),
             after=_errors(after) if changed else {"fit": {}, "validate": {}},
             recordings_before=_errors_by_recording(before),

@@ -69,7 +69,7 @@ def find_columns(path: Path) -> tuple[FoundColumn, ...]:
             continue
         plain, unit = split_unit(name)
         plain = plain.rsplit("/", 1)[-1]
-        stated = raw.unit if raw.unit is not None and is_unit(raw.unit) else unit
+        stated = raw.unit if raw.unit is not None and (raw.unit in _PER_MINUTE or is_unit(raw.unit)) else unit
         if stated is not None and stated.replace(" ", "") in _PER_MINUTE:
             stated = "rpm"
         stem, suggested = (plain, None) if stated else _ending(plain)

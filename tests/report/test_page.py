@@ -11,7 +11,7 @@ import report_studies as studies
 
 from thsa_cosim.batch import Journal
 from thsa_cosim.report.page import write_page
-from thsa_cosim.study import open_study
+from thsa_cosim.study import claim_folder
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = (
@@ -374,7 +374,7 @@ def test_printing_opens_folds_and_leaves_the_page_as_it_was(show: Show, tmp_path
 
 def test_running_study_shows_how_far_it_is(show: Show, tmp_path: Path) -> None:
     labels = ["-30 degC", "25 degC"]
-    open_study(
+    claim_folder(
         tmp_path,
         studies.identity("identify"),
         studies.about(parameters={"R_s": "ohm"}, samples=dict.fromkeys(labels, 10)),

@@ -53,6 +53,8 @@ class FoundEffect:
     parameters: Mapping[str, Value]
     equivalent: tuple[str, ...]
     probability: float
+    order: str = ""
+    """How often it repeats, and over the turn of which shaft; "" if over none."""
 
 
 @dataclass(frozen=True)

@@ -138,6 +138,7 @@ class SimulationSpec:
     inputs: Literal["hold", "mean", "derivative", "intermediate"] | None = None
     tolerance: float | None = None
     step: float | None = None
+    stepping: Literal["free", "samples"] = "free"
     deadline: float = 60.0
     memory_mb: float | None = None
     reuse: Literal["fresh", "reset"] = "fresh"

@@ -195,6 +195,9 @@ class SimulationTable(Table):
     """Relative tolerance handed to the FMU (or to CVODE); left out: the FMU's own."""
     step: Positive | None = None
     """s between communication points; left out: the recording's samples."""
+    stepping: Literal["free", "samples"] = "free"
+    """An FMU that this package exported is given the whole run at once, so that its solver steps across samples;
+    ``"samples"`` communicates at every one of them, as with other FMUs."""
     deadline: Positive = 60.0
     """s; a run that takes longer is killed and counts as failed."""
     memory: Positive | None = None

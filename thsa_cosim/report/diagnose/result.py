@@ -30,6 +30,7 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
                 "parameters": _values(e.parameters),
                 "equivalent": list(e.equivalent),
                 "probability": e.probability,
+                "order": e.order,
             }
             for e in result.effects
         ],

@@ -59,7 +59,11 @@ def verdict(result: Json) -> tuple[Block, ...]:
 def held_out(result: Json) -> str:
     """One sentence on how far the error on held-out recordings fell; empty without such recordings."""
     ratios = [
-        [r for e in result.get(when, {}).get("validate", {}).values() if (r := noise_ratio(e)) is not None]
+        [
+            r
+            for e in (result.get(when) or {}).get("validate", {}).values()
+            if (r := noise_ratio(e)) is not None
+        ]
         for when in ("before", "after")
     ]
     if not ratios[0]:

@@ -168,7 +168,7 @@ int instance_switch_modes(Instance *c, int report) {
     int changed = 0;
     for (int k = 0; k < N_G; k++) {
         const double band = instance_dead_band(c, k);
-        const double wanted = c->g[k] > band ? 1.0 : c->g[k] < -band ? 0.0 : now->m[k];
+        const double wanted = c->g[k] > band ? 1.0 : c->g[k] < -band || c->g[k] == 0.0 ? 0.0 : now->m[k];
         now->span[k] = fmax(now->span[k], fabs(c->g[k]));
         if (wanted == now->m[k]) continue;
         now->m[k] = wanted;

@@ -177,7 +177,7 @@ def test_it_starts_from_the_share_of_the_promise_that_serves_best(monkeypatch: p
 
     monkeypatch.setattr(room, "refine", refined)
     base = replace(base, vector=np.array(list(DECLARED.values())))
-    for promise, start in ((2e-3, 2e-3), (2e-3 / 0.3, 2e-3), (2e-2, 2e-3), (-2e-3, -2e-4)):
+    for promise, start in ((2e-3, 2e-3), (2e-3 / 0.3, 2e-3), (2e-2, 2e-3), (5e-4, 5e-4)):
         assert score(own, base, held, proposed(promise)) is None
         assert started.pop() == pytest.approx(start, rel=1e-6)
 

@@ -53,7 +53,7 @@ def report(lines: list[str]) -> int:
     total: Counter[str] = sum(counts.values(), Counter())
     for module, own in [*sorted(counts.items()), ("all", total)]:
         print(
-            f"{module:50s} {own['noticed']:5d} of {own.total():5d}  {100 * own['noticed'] / own.total():5.1f} %"
+            f"{module:50s} {own['noticed']:5d} of {own.total():5d}  {100 * own['noticed'] / (own.total() or 1):5.1f} %"
         )
     print("\n".join(survived))
     return 0 if total and total["noticed"] >= GOAL * total.total() else 1

@@ -92,13 +92,18 @@ def _connector(name: str, pins: Sequence[tuple[str, str]], fmus: Mapping[str, Fm
     return Connector(name, causality, tuple((pin, 1.0, 0.0) for pin in pins))  # type: ignore[arg-type]
 
 
+def system_folder() -> Path:
+    """Folder in the user's cache where systems are kept by their content."""
+    base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    return Path(base).expanduser() / "thsa-cosim" / "systems"
+
+
 def assembled(
     name: str, parts: Sequence[Part], wires: Sequence[Wire], connectors: Mapping[str, Sequence[str]]
 ) -> Path:
     """Write the system as an archive into the user's cache folder, named after its content, and return its path."""
     system, archives = assemble(name, parts, wires, connectors)
-    base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    folder = Path(base).expanduser() / "thsa-cosim" / "systems"
+    folder = system_folder()
     stops = [c.fmu.default_experiment.stop for c in system.components if c.fmu.default_experiment.stop]
     experiment = DefaultExperiment(0.0, max(stops, default=None))
     try:

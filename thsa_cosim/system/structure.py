@@ -88,6 +88,13 @@ class System:
             raise FmuError(f"component {pin[0]!r}: {error}" if pin[0] else str(error)) from None
 
 
+def qualified(component: str, variable: str) -> str:
+    """Name of a component's variable in the system; a derivative stays one: ``der(plant.x)``."""
+    if variable.startswith("der(") and variable.endswith(")"):
+        return f"der({component}.{variable[4:-1]})"
+    return f"{component}.{variable}"
+
+
 def unit_conversion(source: Variable, target: Variable, where: str) -> tuple[float, float]:
     """Return (factor, offset) from the unit of ``source`` to that of ``target``; FmuError if there is none."""
     if not source.unit or not target.unit or source.unit == target.unit:

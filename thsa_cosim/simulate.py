@@ -15,6 +15,7 @@ from thsa_cosim import __version__
 from thsa_cosim.batch import Experiment, Job, Outcome
 from thsa_cosim.costs import nrmse, rmse
 from thsa_cosim.errors import ScenarioError, StudyError
+from thsa_cosim.inspection import Residual, Trust, judge
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario, open_runner
 from thsa_cosim.signals import FloatArray, Signals
@@ -67,6 +68,12 @@ class SimulateResult:
     files: tuple[Path, ...]
     notes: tuple[str, ...] = ()
 
+    @property
+    def trust(self) -> Trust:
+        """Whether the model leaves nothing but noise of the fit recordings (of all, without any)."""
+        fit = [r for r in self.recordings if r.role == "fit"] or self.recordings
+        return judge([residual for r in fit for residual in _residuals(self.scenario, r)])
+
     def to_dict(self) -> dict[str, Any]:
         """Return the content of result.json: plain JSON types."""
         return {
@@ -78,6 +85,8 @@ class SimulateResult:
             "failures": dict(self.failures),
             "fmu": {"path": str(self.scenario.fmu.path), "sha256": self.scenario.fmu.sha256},
             "version": __version__,
+            "data": self.scenario.data.to_dict(),
+            "trust": self.trust.to_dict(),
             "notes": list(self.notes),
             "recordings": [
                 {
@@ -199,9 +208,11 @@ def _compare(scenario: Scenario, recording: Recording, role: str, outcome: Outco
         for name in measured.names:
             spec = scenario.cost.channels.get(name)
             given = spec.noise if spec is not None else None
+            kept = reached & ~recording.left_out.get(name, np.zeros(reached.shape, dtype=np.bool_))
+            simulated = at_samples[name][kept[reached]]
             errors[name] = ChannelFit(
-                rmse=rmse(measured[name][reached], at_samples[name]),
-                nrmse=nrmse(measured[name][reached], at_samples[name]),
+                rmse=rmse(measured[name][kept], simulated),
+                nrmse=nrmse(measured[name][kept], simulated),
                 noise=given if given is not None else recording.noise.get(name, 0.0),
                 unit=measured.units[name],
             )
@@ -217,6 +228,34 @@ def _compare(scenario: Scenario, recording: Recording, role: str, outcome: Outco
         duration_s=outcome.duration_s,
         console=outcome.console,
     )
+
+
+def _residuals(scenario: Scenario, found: SimulatedRecording) -> list[Residual]:
+    """What a simulation leaves of each compared signal, over its noise, where it counts."""
+    if found.simulated is None:
+        return []
+    recording = next(r for r in (*scenario.fit, *scenario.validate) if r.name == found.name)
+    time = recording.compared.time
+    inside = time <= found.simulated.time[-1] * (1.0 + 1e-12) + 1e-9
+    residuals = []
+    for name in scenario.cost.channels:
+        noise = found.errors[name].noise
+        kept = inside & recording.counted(name)
+        if not noise > 0.0 or not kept.any():
+            continue
+        simulated = found.simulated.select((name,)).resample(time[kept])[name]
+        inputs = scenario.drive(recording).resample(time[kept])
+        residuals.append(
+            Residual(
+                found.name,
+                name,
+                (simulated - recording.compared[name][kept]) / noise,
+                noise,
+                found.errors[name].unit,
+                {n: inputs[n] for n in inputs.names},
+            )
+        )
+    return residuals
 
 
 def _write_csv(folder: Path, result: SimulatedRecording) -> Path:

@@ -6,6 +6,7 @@ import ctypes as ct
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +37,8 @@ class Fmi3:
         *,
         logging: bool = False,
         event_mode: bool = False,
-        update: Callable[[Fmi3, float, bool, bool, bool], None] | None = None,
+        early_return: bool = False,
+        update: Callable[[Fmi3, float, bool, bool, bool], bool | None] | None = None,
         required: Sequence[int] = (),
         library: Path | None = None,
     ):
@@ -46,11 +48,21 @@ class Fmi3:
         self._logger = LOGGER3(
             lambda _e, status, category, text: self.log.append((status, category.decode(), text.decode()))
         )
-        self._update = UPDATE3(
-            lambda _e, time, may_set, may_get, finished, _early, _asked, _at: (
-                update and update(self, time, may_set, may_get, finished)
-            )
-        )
+
+        def ask(
+            _e: int,
+            time: float,
+            may_set: bool,
+            may_get: bool,
+            finished: bool,
+            _may: bool,
+            early: Any,
+            _at: Any,
+        ) -> None:
+            if update and update(self, time, may_set, may_get, finished):
+                early[0] = True
+
+        self._update = UPDATE3(ask)
         head = (b"one", f"{{{model}}}".encode(), b"", False, logging)
         if kind == "cs":
             create = self.lib.fmi3InstantiateCoSimulation
@@ -62,7 +74,7 @@ class Fmi3:
             create.restype = ct.c_void_p
             hook = self._update if update else UPDATE3()
             self.instance = create(
-                *head, event_mode, False, refs(required), len(required), None, self._logger, hook
+                *head, event_mode, early_return, refs(required), len(required), None, self._logger, hook
             )
         else:
             create = self.lib.fmi3InstantiateModelExchange
@@ -107,13 +119,19 @@ class Fmi3:
         self.call("GetFloat64", refs(vr), n, out, n)
         return np.array(out)
 
-    def step(self, time: float, size: float) -> float:
+    def do_step(self, time: float, size: float) -> tuple[bool, float]:
+        """Whether it returned early, and the time reached."""
         flags, reached = [ct.c_bool(True) for _ in range(3)], ct.c_double()
         self.call(
             "DoStep", ct.c_double(time), ct.c_double(size), True, *map(ct.byref, flags), ct.byref(reached)
         )
-        assert not any(flag.value for flag in flags)
-        return reached.value
+        assert not any(flag.value for flag in flags[:2])
+        return flags[2].value, reached.value
+
+    def step(self, time: float, size: float) -> float:
+        early, reached = self.do_step(time, size)
+        assert not early
+        return reached
 
     def derivative(
         self, unknown: Sequence[int], known: Sequence[int], seed: Sequence[float], *, adjoint: bool = False

@@ -2,6 +2,9 @@
  * Arguments: number of sequences, calls in each. Values that are returned as OK are finite. */
 #include "fuzz.h"
 #include "fmi2Functions.h"
+#include "trajectory.h"
+
+fmi2Status thsaTrajectory1(fmi2Component, Trajectory *);
 
 static long messages;
 
@@ -81,6 +84,27 @@ static void sequence(int calls) {
         case 27: fmi2SetRealInputDerivatives(c, MAYBE(vr), n, order, MAYBE(v)); break;
         case 28: fmi2GetRealOutputDerivatives(c, MAYBE(vr), n, order, MAYBE(w)); break;
         case 29: fmi2GetRealStatus(c, (fmi2StatusKind)any(5), MAYBE(w)); fmi2CancelStep(c); break;
+        case 30: {
+            const double zero[MOST] = {0.0};
+            double times[MOST], starts[2], course[2 * MOST], slopes[2 * MOST], rows[MOST * MOST];
+            Trajectory run = {any(3), 1 + any(2), n, 1 + any(MOST), wr, starts, course, slopes, vr, times, rows,
+                              NULL, 0, 0, 0, 0, 0.0};
+            const unsigned time = 0;
+            if (fmi2GetReal(c, &time, 1, &now) != fmi2OK) break;
+            starts[0] = now, starts[1] = now + 0.05;
+            for (int k = 0; k < MOST; k++) times[k] = now + (any(30) ? 0.03 * k : value());
+            for (int k = 0; k < 2 * MOST; k++) {
+                course[k] = any(50) ? 0.1 * (double)any(9) : value();
+                slopes[k] = (double)any(3);
+            }
+            for (size_t k = 0; k < run.n_inputs; k++) wr[k] = any(20) ? VR_U + any(N_U + 1) : wr[k];
+            if (!any(20)) run.times = zero;
+            if (!any(40)) run.n_times = 0;
+            status = thsaTrajectory1(c, MAYBE(&run));
+            if (status == fmi2OK)
+                for (size_t k = 0; k < run.n_outputs * run.n_times; k++) CHECK(isfinite(rows[k]));
+            break;
+        }
         default: {
             const double steps[] = {0.0, 1e-3, 1e-2, 0.1, 0.1, 1e-9};
             const unsigned time = 0;

@@ -2,6 +2,9 @@
  * Arguments: number of sequences, calls in each. Values that are returned as OK are finite. */
 #include "fuzz.h"
 #include "fmi3Functions.h"
+#include "trajectory.h"
+
+fmi3Status thsaTrajectory1(fmi3Instance, Trajectory *);
 
 static long messages;
 static unsigned long long first;
@@ -95,6 +98,26 @@ static void sequence(int calls) {
         case 26: fmi3GetEventIndicators(c, MAYBE(w), any(10) ? N_G : 0); break;
         case 27: fmi3GetOutputDerivatives(c, MAYBE(vr), n, order, MAYBE(w), n); break;
         case 28: fmi3EnterConfigurationMode(c); fmi3GetShiftDecimal(c, vr, n, w); break;
+        case 29: {
+            const double zero[MOST] = {0.0};
+            double times[MOST], starts[2], course[2 * MOST], slopes[2 * MOST], rows[MOST * MOST];
+            Trajectory run = {any(3), 1 + any(2), n, 1 + any(MOST), wr, starts, course, slopes, vr, times, rows,
+                              NULL, 0, 0, 0, 0, 0.0};
+            const unsigned time = 0;
+            if (fmi3GetFloat64(c, &time, 1, &now, 1) != fmi3OK) break;
+            starts[0] = now, starts[1] = now + 0.05;
+            for (int k = 0; k < MOST; k++) times[k] = now + (any(30) ? 0.03 * k : value());
+            for (int k = 0; k < 2 * MOST; k++) {
+                course[k] = any(50) ? 0.1 * (double)any(9) : value();
+                slopes[k] = (double)any(3);
+            }
+            for (size_t k = 0; k < run.n_inputs; k++) wr[k] = any(20) ? VR_U + any(N_U + 1) : wr[k];
+            if (!any(20)) run.times = zero;
+            if (!any(40)) run.n_times = 0;
+            if (thsaTrajectory1(c, any(40) ? &run : NULL) == fmi3OK)
+                for (size_t k = 0; k < run.n_outputs * run.n_times; k++) CHECK(isfinite(rows[k]));
+            break;
+        }
         default: {
             const double steps[] = {0.0, 1e-3, 1e-2, 0.1, 0.1, 1e-9};
             const unsigned time = 0;

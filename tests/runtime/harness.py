@@ -22,7 +22,7 @@ import thsa_cosim
 HERE = Path(__file__).parent
 RUNTIME = Path(thsa_cosim.__file__).parent / "export" / "runtime"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
-COMMON = ("instance.c", "derivatives.c", "snapshot.c", "solver.c", "advance.c")
+COMMON = ("instance.c", "derivatives.c", "snapshot.c", "solver.c", "advance.c", "trajectory.c")
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 
 Array = NDArray[np.float64]

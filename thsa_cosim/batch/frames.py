@@ -35,6 +35,7 @@ class Setup:
     kind: str | None
     backend: str | None
     reuse: str
+    stepping: str
     main: dict[str, Any] | None
     """What ``multiprocessing`` needs to import the parent's __main__, where reducers live in it."""
 

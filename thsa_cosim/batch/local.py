@@ -21,7 +21,7 @@ from thsa_cosim.batch.study import Study
 from thsa_cosim.batch.worker import LOST
 from thsa_cosim.errors import ParameterError, StudyError
 from thsa_cosim.fmu.machine import temporary_fault
-from thsa_cosim.fmu.plant import Backend, Kind, Reuse
+from thsa_cosim.fmu.plant import Backend, Kind, Reuse, Stepping
 
 _TICK_S = 0.05
 """How often deadlines, memory and floods are looked at."""
@@ -55,6 +55,7 @@ class LocalRunner:
         deadline_s: float | None = None,
         memory_limit_mb: float | None = None,
         reuse: Reuse = "fresh",
+        stepping: Stepping = "free",
         kind: Kind | None = None,
         backend: Backend | None = None,
         recycle_runs: int = 10_000,
@@ -73,7 +74,7 @@ class LocalRunner:
             MiB that one worker may grow beyond its idle size; None: no limit.
         reuse
             "fresh": a new instance per run. "reset": only for FMUs whose reset is known to be right.
-        kind, backend
+        kind, backend, stepping
             As for ``Plant.open``.
         recycle_runs, recycle_growth_mb
             A worker is replaced after so many runs, or when idle it has grown by so many MiB (leaks).
@@ -106,6 +107,7 @@ class LocalRunner:
             kind=kind,
             backend=backend,
             reuse=reuse,
+            stepping=stepping,
             main=self._study.main,
         )
         self._inbox = open_inbox()

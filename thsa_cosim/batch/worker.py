@@ -216,6 +216,7 @@ class Worker:
                 kind=setup.kind,
                 backend=setup.backend,
                 reuse=setup.reuse,
+                stepping=setup.stepping,
                 progress=self._progress[:4],
                 on_message=_to_stderr,
             )

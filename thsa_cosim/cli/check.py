@@ -68,12 +68,17 @@ def _scenario(path: Path) -> Checked:
     """A scenario loads, or says in one sentence why not; then its data and its FMU."""
     from thsa_cosim.inspection import Inspection
     from thsa_cosim.report.inspection import print_inspection
-    from thsa_cosim.scenario import load_tune
+    from thsa_cosim.scenario import Scenario, StagedScenario, load_tune
     from thsa_cosim.scenario.load import read_toml
     from thsa_cosim.scenario.stages import load_study
 
     loaded = load_tune(path) if read_toml(path).get("kind") == "tune" else load_study(path)
-    data = Inspection()
+    scenarios = (
+        [stage.scenario for stage in loaded.stages] if isinstance(loaded, StagedScenario) else [loaded]
+    )
+    of_recordings = [s.data for s in scenarios if isinstance(s, Scenario)]
+    findings = tuple(f for data in of_recordings for f in data.findings)
+    data = Inspection.of(findings, tuple(s for data in of_recordings for s in data.repairs))
     verdict = {"good": "ok", "usable": "warning", "bad": "failed"}[data.verdict]
     content = {
         "kind": "scenario",
@@ -85,7 +90,7 @@ def _scenario(path: Path) -> Checked:
 
     def show(out: "Console") -> None:
         out.print(f"{path}: a scenario of kind {loaded.kind!r} that loads", highlight=False, markup=False)
-        print_inspection(out, data)
+        print_inspection(out, data, remedies=True)
         out.print(f"verdict: {verdict}", highlight=False)
 
     return content, show

@@ -33,6 +33,7 @@ def diagnose(options: StudyOptions, package: Path | None) -> None:
     loaded = load_scenario(options.scenario, **options.overrides)
     options.check_kind(loaded.kind, "diagnose")
     loaded = _with_package(loaded, package)
+    options.show_data(loaded)
     place = options.place()
     folder = place["folder"]
     if not _is_complete(loaded, folder):

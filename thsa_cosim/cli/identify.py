@@ -37,6 +37,7 @@ def identify(options: StudyOptions, export_fmu: bool | None, dry_run: bool) -> N
     loaded = load_study(options.scenario, **options.overrides)
     if loaded.kind != "diagnose":  # its parameters can be identified as they are
         options.check_kind(loaded.kind, "identify")
+    options.show_data(*(s.scenario for s in loaded.stages) if not isinstance(loaded, Scenario) else (loaded,))
     if dry_run:
         show_forecast(options, loaded)
         return

@@ -15,6 +15,8 @@ from thsa_cosim.errors import InputError, ThsaCosimError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from thsa_cosim.scenario import Scenario
+
 PATH = click.Path(path_type=Path)
 
 P = ParamSpec("P")
@@ -92,6 +94,16 @@ class StudyOptions:
         except ThsaCosimError as error:
             click.echo(f"note: no page was written: {error}", err=True)
             return []
+
+    def show_data(self, *scenarios: "Scenario") -> None:
+        """Print on stderr, one line each, what is wrong with the recordings, before anything is searched."""
+        from thsa_cosim.report.inspection import print_inspection
+
+        if self.quiet:
+            return
+        out = console(stderr=True)
+        for scenario in scenarios:
+            print_inspection(out, scenario.data, notes=False)
 
     def check_kind(self, kind: str, wanted: str) -> None:
         """InputError, with the command to use, if the scenario is of another kind."""

@@ -18,6 +18,7 @@ def simulate(options: StudyOptions) -> None:
     from thsa_cosim.study import describe, open_study, study_identity
 
     loaded = load_scenario(options.scenario, **options.overrides)
+    options.show_data(loaded)
     place = options.place("" if loaded.kind == "simulate" else "-simulate")
     folder = place["folder"]
     about = describe(loaded, options.repeat("simulate", folder))

@@ -1,11 +1,12 @@
 """What a diagnosis found, as frozen data."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from thsa_cosim.identify import ForceBalance
+from thsa_cosim.inspection import Inspection
 from thsa_cosim.signals import Signals
 
 Verdict = Literal["missing-effect", "no-missing-effect", "unexplained-structure", "not-tested"]
@@ -185,3 +186,5 @@ class DiagnosisResult:
     evaluations: int
     failures: Mapping[str, int]
     notes: tuple[str, ...]
+    data: Inspection = field(default_factory=Inspection)
+    """What is to be known about the recordings."""

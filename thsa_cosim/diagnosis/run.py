@@ -32,6 +32,7 @@ from thsa_cosim.diagnosis.fitting.trials import Trial, spec_of, trials_of, with_
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import ChannelError, Comparison, DiagnosisResult, EmpiricalLaw
 from thsa_cosim.errors import StudyError
+from thsa_cosim.export.compile import this_platform
 from thsa_cosim.identify import Comparison as Compared
 from thsa_cosim.identify import ForceBalance, force_balance
 from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
@@ -174,6 +175,11 @@ class _Closing:
             if terms is not None and self.spec.empirical:
                 # The share stays that of the effects: a law describes and explains nothing.
                 model, extended, after = self._with_law(terms)
+        if model is not None and extended is not None and (here := this_platform()):
+            notes.append(
+                f"{extended.name} is for {here[0]} only; thsa-cosim export {model} --package {self.spec.package}"
+                f" -o {extended} compiles it for all platforms"
+            )
         counts = dict(self.bench.failures)
         changed = after is not before
         for identified in (before, after) if changed else (before,):
@@ -214,6 +220,7 @@ class _Closing:
             evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if changed else 0),
             failures=counts,
             notes=tuple(notes),
+            data=self.scenario.data,
         )
 
     def _declared(self) -> Identified:

@@ -41,6 +41,7 @@ FMI3_COMMON = {
     "providesAdjointDerivatives": "true",
 }
 FMI3_CO_SIMULATION = {
+    "canReturnEarlyAfterIntermediateUpdate": "true",
     "canHandleVariableCommunicationStepSize": "true",
     "maxOutputDerivativeOrder": "1",
     "providesIntermediateUpdate": "true",

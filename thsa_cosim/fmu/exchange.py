@@ -1,10 +1,11 @@
 """Model Exchange: our own integration of an FMU's right-hand side, with all of its events.
 
 Inputs are applied as u(t) at every call of the right-hand side, so results do not depend on the output
-times. Integration stops at every kink of a linear input (no pulse is stepped over) and restarts, through
-Event Mode, wherever an input jumps. State events are located by CVODE's root finding, and the signs of the
-event indicators are compared after every step as well (an indicator that returns from exactly zero has no
-root); time and step events follow FMI 2.0.4 clause 3.2 and FMI 3.0.2 clause 3.2.
+times: outputs between the solver's steps come from its interpolation of the states. Integration stops at every
+kink of a linear input (no pulse is stepped over; see ``segments``) and restarts, through Event Mode, wherever an
+input jumps. State events are located by CVODE's root finding, and the signs of the event indicators are compared
+after every step as well (an indicator that returns from exactly zero has no root); time and step events follow
+FMI 2.0.4 clause 3.2 and FMI 3.0.2 clause 3.2.
 """
 
 from collections.abc import Iterator
@@ -14,9 +15,9 @@ import numpy as np
 
 from thsa_cosim.fmu.cvode import Cvode
 from thsa_cosim.fmu.failure import SimulationFailure, Status
-from thsa_cosim.fmu.inputs import sampled
 from thsa_cosim.fmu.instance import Instance, Phase
 from thsa_cosim.fmu.plan import Plan
+from thsa_cosim.fmu.segments import MERGED, segments, time_slack
 from thsa_cosim.signals import FloatArray, Signals
 
 _SAFETY = 0.1
@@ -39,37 +40,16 @@ class Segment:
     """Whether some input jumps at ``start``."""
 
 
-def segments(plan: Plan) -> list[Segment]:
+def stretches(plan: Plan, merged: float) -> list[Segment]:
     """Return the linear stretches of the inputs between the first and the last output time."""
-    t0, t1 = float(plan.grid.times[0]), float(plan.grid.times[-1])
-    inputs = plan.inputs
-    if inputs is None or not plan.input_variables:
-        return [Segment(t0, t1, np.empty(0), np.empty(0), False)]
-    slack = _slack(plan)
-    knots = inputs.time[(inputs.time > t0 + slack) & (inputs.time < t1 - slack)]
-    times = np.concatenate(([t0], knots, [t1])) if t1 > t0 else np.array([t0, t0 + 1.0])
-    table = sampled(inputs, plan.input_variables, times)
-    linear = plan.linear
-    slopes = np.where(linear, np.diff(table, axis=0) / np.diff(times)[:, None], 0.0)
-    jumps = np.zeros(len(times) - 1, dtype=bool)
-    jumps[1:] = (table[1:-1] != table[:-2])[:, ~linear].any(axis=1)
-    scale = np.max(np.abs(slopes), axis=0, initial=0.0)
-    kinks = (np.abs(np.diff(slopes, axis=0)) > 1e-9 * scale).any(axis=1)
-    starts = [0, *(np.flatnonzero(kinks | jumps[1:]) + 1).tolist()]
-    result = []
-    for a, b in zip(starts, [*starts[1:], len(times) - 1], strict=True):
-        slope = np.where(linear, (table[b] - table[a]) / (times[b] - times[a]), 0.0)
-        result.append(Segment(float(times[a]), float(times[b]), table[a], slope, bool(jumps[a])))
-    if t1 > t0 and (table[-1] != table[-2])[~linear].any():
-        # A held input that jumps at the very end: the last row of outputs belongs to its new value.
-        result.append(Segment(t1, t1, table[-1], np.zeros(len(linear)), True))
-    return result
-
-
-def _slack(plan: Plan) -> float:
-    """Times closer than this are one time [s]."""
-    steps = plan.grid.steps
-    return 1e-6 * float(steps.min()) if len(steps) else 1e-12
+    found = segments(plan.inputs, plan.input_variables, plan.linear, plan.grid.times, merged)
+    ends = [*found.starts[1:].tolist(), found.stop]
+    return [
+        Segment(float(start), end, value, slope, bool(jumps))
+        for start, end, value, slope, jumps in zip(
+            found.starts, ends, found.values, found.slopes, found.jumps, strict=True
+        )
+    ]
 
 
 class _Run:
@@ -175,9 +155,9 @@ class _Run:
     # -- the loop -------------------------------------------------------------------------------------
     def integrate(self) -> None:
         times = self.plan.grid.times
-        slack = _slack(self.plan)
-        stretches: Iterator[Segment] = iter(segments(self.plan))
-        self.segment = next(stretches)
+        slack = time_slack(times)
+        following: Iterator[Segment] = iter(stretches(self.plan, min(MERGED, self.rtol)))
+        self.segment = next(following)
         instance, t1, t = self.instance, float(times[-1]), float(times[0])
         instance.initialize_begin(t, t1, self.rtol)
         if self.plan.input_channels:
@@ -220,7 +200,7 @@ class _Run:
                 step_event, terminate = self._completed()
                 self.ends |= terminate
                 is_time_event = self.next_event is not None and t >= self.next_event - 1e-3 * slack
-                is_jump = self._advance_segment(t, slack, stretches)
+                is_jump = self._advance_segment(t, slack, following)
                 is_state_event = is_root or bool((self.signs() != signs).any())
                 if step_event or is_time_event or is_jump or is_state_event:
                     here = here + 1 if t - before <= slack * 1e-3 else 0
@@ -243,15 +223,15 @@ class _Run:
             return False, False
         return self.instance.completed_integrator_step()
 
-    def _advance_segment(self, time: float, slack: float, stretches: Iterator[Segment]) -> bool:
+    def _advance_segment(self, time: float, slack: float, later: Iterator[Segment]) -> bool:
         """Go on to the stretch of inputs that begins at ``time``; return whether an input jumps there."""
         jumps = False
         while time >= self.segment.stop - 1e-3 * slack:
-            following = next(stretches, None)
-            if following is None:
+            segment = next(later, None)
+            if segment is None:
                 break
-            self.segment = following
-            jumps |= following.jumps
+            self.segment = segment
+            jumps |= segment.jumps
         return jumps
 
     # -- exact Jacobian -------------------------------------------------------------------------------

@@ -70,6 +70,10 @@ class Library:
         self._functions[name] = function
         return function
 
+    def exports(self, name: str) -> bool:
+        """Whether the library has the C function ``name``."""
+        return hasattr(self._dll, name)
+
     @staticmethod
     def address(function: Any) -> int:
         """Return a function's (or callback's) address as an integer."""

@@ -57,6 +57,8 @@ class Plan:
         self.inputs, self.input_variables, self.linear = inputs, variables, linear
         self.tables: Any = None
         """Kept here by ``stepping`` between runs."""
+        self.courses: dict[float, Any] = {}
+        """Kept here by ``trajectory`` between runs."""
 
     def _rows(self, table: FloatArray, wanted: NDArray[np.bool_]) -> list[tuple[Channel, NDArray[Any]]]:
         """One contiguous (n, variables) table per data type, of the ``wanted`` columns."""

@@ -20,11 +20,13 @@ from thsa_cosim.fmu.native import MessageSink
 from thsa_cosim.fmu.plan import Plan
 from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.fmu.stepping import check_names, step_through
+from thsa_cosim.fmu.trajectory import follow, is_offered, solver_tolerance
 from thsa_cosim.signals import FloatArray, Signals
 
 Kind = Literal["co-simulation", "model-exchange"]
 Backend = Literal["compiled", "python"]
 Reuse = Literal["fresh", "reset"]
+Stepping = Literal["free", "samples"]
 
 _PLANS = 64
 _log = logging.getLogger(__name__)
@@ -45,6 +47,7 @@ class Plant:
         kind: Kind | None = None,
         backend: Backend | None = None,
         reuse: Reuse = "fresh",
+        stepping: Stepping = "free",
         scratch: ScratchFolder | None = None,
         progress: FloatArray | None = None,
         on_message: MessageSink | None = None,
@@ -72,6 +75,7 @@ class Plant:
             )
         self.backend: Backend = backend or _default_backend()
         self.reuse: Reuse = reuse
+        self.stepping: Stepping = stepping
         self.progress = np.zeros(4) if progress is None else progress
         self._scratch = scratch
         self._on_message = on_message
@@ -89,6 +93,7 @@ class Plant:
         kind: Kind | None = None,
         backend: Backend | None = None,
         reuse: Reuse = "fresh",
+        stepping: Stepping = "free",
         on_message: MessageSink | None = None,
     ) -> "Plant":
         """Read and unpack the FMU ``path`` into a temporary folder, which ``close`` removes.
@@ -102,6 +107,10 @@ class Plant:
         reuse
             "fresh": a new instance per run. "reset": one instance, fmiXReset between runs; only for FMUs
             whose reset is known to be right (``thsa-cosim check``).
+        stepping
+            "free": an FMU that offers it is given the whole run in one call, and its solver steps across
+            samples (``thsa_cosim.fmu.trajectory``). "samples": it communicates at every output time, as
+            other FMUs always do.
         on_message
             Called with each line that the FMU logs.
 
@@ -121,6 +130,7 @@ class Plant:
                 kind=kind,
                 backend=backend,
                 reuse=reuse,
+                stepping=stepping,
                 scratch=scratch,
                 on_message=on_message,
             )
@@ -221,10 +231,17 @@ class Plant:
             from thsa_cosim.fmu.exchange import integrate
 
             return integrate(instance, plan, self.progress, tolerance)
+        exact = plan.mode in ("derivative", "intermediate")
+        free = self.stepping == "free" and exact and is_offered(instance)
+        if free:
+            tolerance = solver_tolerance(instance, tolerance)
         instance.initialize_begin(start, stop, tolerance)
         instance.set_values(plan.input_channels, plan.first)
         instance.initialize_end()
-        signals = step_through(instance, plan, self.progress, self.backend == "compiled")
+        if free and tolerance is not None:
+            signals = follow(instance, plan, self.progress, tolerance)
+        else:
+            signals = step_through(instance, plan, self.progress, self.backend == "compiled")
         self.progress[0] = Phase.TERMINATE
         instance.terminate()
         return signals

@@ -7,6 +7,7 @@ import numpy as np
 from thsa_cosim.costs import nrmse, rmse, signal_range
 from thsa_cosim.identify.problem import Case
 from thsa_cosim.identify.results import ChannelError, Comparison
+from thsa_cosim.inspection import Residual
 from thsa_cosim.recordings import Recording
 from thsa_cosim.signals import Signals
 
@@ -16,16 +17,16 @@ def compare(case: Case, recording: Recording, role: str, simulated: Signals) -> 
     measured = case.measured
     noise = {channel.name: channel.noise for channel in case.channels}
     on_samples = simulated.select(measured.names).resample(measured.time)
-    errors = {
-        name: ChannelError(
-            rmse=rmse(measured[name], on_samples[name]),
-            nrmse=nrmse(measured[name], on_samples[name]),
+    errors = {}
+    for name in measured.names:
+        kept = recording.counted(name)
+        errors[name] = ChannelError(
+            rmse=rmse(measured[name][kept], on_samples[name][kept]),
+            nrmse=nrmse(measured[name][kept], on_samples[name][kept]),
             noise=noise.get(name, recording.noise.get(name, 0.0)),
             unit=measured.units[name],
-            samples=measured.time.size,
+            samples=int(np.count_nonzero(kept)),
         )
-        for name in measured.names
-    }
     return Comparison(
         recording=case.name,
         role=role,
@@ -36,6 +37,24 @@ def compare(case: Case, recording: Recording, role: str, simulated: Signals) -> 
     )
 
 
+def case_residuals(case: Case, simulated: Signals) -> list[Residual]:
+    """What a simulation leaves of each fitted signal, where it counts, with the inputs at the same samples."""
+    found = []
+    for channel in case.channels:
+        inputs = case.inputs.resample(channel.time)
+        found.append(
+            Residual(
+                recording=case.name,
+                channel=channel.name,
+                values=channel.residual(simulated) / np.sqrt(channel.weight),
+                noise=channel.noise,
+                unit=case.measured.units.get(channel.name, "1"),
+                inputs={name: inputs[name] for name in inputs.names},
+            )
+        )
+    return found
+
+
 def summarise(comparisons: Sequence[Comparison]) -> dict[str, dict[str, ChannelError]]:
     """Errors per role and channel over all samples; nrmse relative to the range over all recordings."""
     summary: dict[str, dict[str, ChannelError]] = {"fit": {}, "validate": {}}
@@ -43,16 +62,16 @@ def summarise(comparisons: Sequence[Comparison]) -> dict[str, dict[str, ChannelE
         members = [c for c in comparisons if c.role == role]
         for name in members[0].errors if members else ():
             measured = np.concatenate([c.measured[name] for c in members])
-            simulated = np.concatenate([c.simulated[name] for c in members])
             weights = np.array([c.errors[name].samples for c in members], dtype=np.float64)
             noises = np.array([c.errors[name].noise for c in members])
-            error = rmse(measured, simulated)
+            errors = np.array([c.errors[name].rmse for c in members])
+            error = float(np.sqrt(np.sum(weights * errors**2) / np.sum(weights)))
             span = signal_range(measured)
             channels[name] = ChannelError(
                 rmse=error,
                 nrmse=error / span if span > 0.0 else float("nan"),
                 noise=float(np.sqrt(np.sum(weights * noises**2) / np.sum(weights))),
                 unit=members[0].errors[name].unit,
-                samples=measured.size,
+                samples=int(np.sum(weights)),
             )
     return summary

@@ -160,6 +160,12 @@ def _channel(
                 f"{scenario.path}: {recording.name} is too short for cost.channels.{name}.band; leave it out."
             ) from None
         every = max(1, int(1.0 / (2.5 * spec.band * step)))
+    if name in recording.left_out:
+        counted = counted & ~recording.left_out[name]
+        if np.count_nonzero(counted) < 2:
+            raise ScenarioError(
+                f"{scenario.path}: the repairs of {name!r} leave no sample of {recording.name}; leave out fewer."
+            )
     return Channel(
         name=name,
         time=time[counted][::every],

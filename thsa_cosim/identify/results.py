@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from thsa_cosim.inspection import Inspection, Trust
 from thsa_cosim.laws import Law
 from thsa_cosim.search import Generation, LocalSearch
 from thsa_cosim.signals import FloatArray, Signals
@@ -145,6 +146,10 @@ class IdentifyResult:
     notes: tuple[str, ...] = ()
     settings: Mapping[str, object] = field(default_factory=dict)
     force: ForceBalance | None = None
+    data: Inspection = field(default_factory=Inspection)
+    """What is to be known about the recordings."""
+    trust: Trust = field(default_factory=lambda: Trust("explained"))
+    """Whether the fit leaves nothing but noise."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from thsa_cosim import __version__
 from thsa_cosim.batch import Experiment, Job, Journal, Runner
 from thsa_cosim.errors import InputError, StudyError
-from thsa_cosim.identify.compare import compare, summarise
+from thsa_cosim.identify.compare import case_residuals, compare, summarise
 from thsa_cosim.identify.evaluate import Evaluator, Reply, Request, residual_experiment, terms_experiment
 from thsa_cosim.identify.force import force_balance
 from thsa_cosim.identify.interleave import interleave
@@ -26,6 +26,7 @@ from thsa_cosim.identify.results import (
     Progress,
 )
 from thsa_cosim.identify.silent import note_on, silent_parameters
+from thsa_cosim.inspection import Residual, judge
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario, open_runner
 from thsa_cosim.search import EvolutionSettings, Generation
@@ -209,7 +210,17 @@ class _Study:
             notes=(*scenario.notes, *failed, *notes, *left_out, *self._notes, *unsaid),
             settings={**asdict(scenario.search), "error": scenario.cost.error},
             force=force,
+            data=scenario.data,
+            trust=judge(self._residuals()),
         )
+
+    def _residuals(self) -> list[Residual]:
+        """What the fit leaves of every fitted signal, where it counts."""
+        found = []
+        for k, search in sorted(self._found.items()):
+            for case, simulated in zip(self._points[k].cases, search.signals, strict=False):
+                found += case_residuals(case, simulated)
+        return found
 
     def _force(
         self, comparisons: Sequence[Comparison], laws: Mapping[str, LawResult]

@@ -56,14 +56,15 @@ _ORDER: Mapping[str, int] = {"error": 0, "warning": 1, "note": 2}
 
 @dataclass(frozen=True)
 class Inspection:
-    """What is to be known about recordings, the gravest first."""
+    """What is to be known about recordings, the gravest first; ``repairs`` says what was left out by consent."""
 
     findings: tuple[Finding, ...] = ()
+    repairs: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, findings: Iterable[Finding]) -> "Inspection":
+    def of(cls, findings: Iterable[Finding], repairs: tuple[str, ...] = ()) -> "Inspection":
         """Return an inspection with ``findings`` sorted by severity; the order stays within one."""
-        return cls(tuple(sorted(findings, key=lambda f: _ORDER[f.severity])))
+        return cls(tuple(sorted(findings, key=lambda f: _ORDER[f.severity])), repairs)
 
     @property
     def verdict(self) -> Literal["good", "usable", "bad"]:
@@ -73,4 +74,8 @@ class Inspection:
 
     def to_dict(self) -> dict[str, Any]:
         """Return ``data`` of ``result.json``."""
-        return {"verdict": self.verdict, "findings": [f.to_dict() for f in self.findings]}
+        return {
+            "verdict": self.verdict,
+            "findings": [f.to_dict() for f in self.findings],
+            **({"repairs": list(self.repairs)} if self.repairs else {}),
+        }

@@ -6,10 +6,12 @@ from thsa_cosim.recordings.recording import (
     SUFFIXES,
     Column,
     Recording,
+    Samples,
     column_names,
     load_columns,
     read_recording,
 )
+from thsa_cosim.recordings.repair import Repair
 from thsa_cosim.recordings.table import RawColumn, split_unit
 
 __all__ = [
@@ -17,6 +19,8 @@ __all__ = [
     "Column",
     "RawColumn",
     "Recording",
+    "Repair",
+    "Samples",
     "TimeAxis",
     "column_names",
     "load_columns",

@@ -1,7 +1,7 @@
 """A recording: measured signals in the FMU's names and units, checked once, here."""
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -12,7 +12,9 @@ import numpy as np
 from thsa_cosim.errors import RecordingError, ThsaCosimError, UnitError, did_you_mean, did_you_mean_path
 from thsa_cosim.recordings.axis import TimeAxis, check_finite, common_grid, source_unit, times
 from thsa_cosim.recordings.noise import noise_estimate
+from thsa_cosim.recordings.outliers import Mask
 from thsa_cosim.recordings.piecewise import fit_piecewise_linear
+from thsa_cosim.recordings.repair import Repair, coded, repaired
 from thsa_cosim.recordings.table import Choose, RawColumn, resolve
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.units import convert
@@ -51,6 +53,8 @@ class Column:
     interpolation
         ``"linear"`` between samples, or ``"hold"``: the value stays until the next sample, as a digital
         command does.
+    repair
+        Samples that do not count.
     """
 
     column: str | None = None
@@ -62,6 +66,23 @@ class Column:
     smooth: Literal["none", "mean", "piecewise-linear"] = "none"
     noise: float | None = None
     interpolation: Literal["linear", "hold"] = "linear"
+    repair: Repair = field(default_factory=Repair)
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A signal as the file holds it within the cut, in the FMU variable's unit: nothing smoothed, shifted, resampled.
+
+    ``time``, ``values``: (n,); ``left_out`` (n,): what the scenario's repairs leave out. ``held``: by
+    ``interpolation = "hold"``; ``averaged``: by ``smooth = "mean"``.
+    """
+
+    time: FloatArray
+    values: FloatArray
+    unit: str
+    left_out: Mask
+    held: bool = False
+    averaged: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +100,24 @@ class Recording:
     """What a reader of results should know: sentences."""
     lead_in: float = 0.0
     """s at the beginning that only bring a model into the right state: they drive it and are not compared."""
+    samples: Mapping[str, Samples] = field(default_factory=dict)
+    """What ``signals`` were made of, by the same names; constants are not among them."""
+    left_out: Mapping[str, Mask] = field(default_factory=dict)
+    """Samples of ``signals`` (n,) that repairs leave out, for the signals that have any."""
+    repairs: tuple[str, ...] = ()
+    """What the scenario's repairs did: sentences."""
 
     @property
     def duration(self) -> float:
         """Length in s."""
         return float(self.signals.time[-1] - self.signals.time[0])
+
+    def counted(self, name: str) -> Mask:
+        """Which samples of :attr:`compared` count for a signal: all but those that repairs leave out; (n,) of bool."""
+        kept = np.ones(self.signals.time.shape, dtype=np.bool_)
+        if name in self.left_out:
+            kept = ~self.left_out[name]
+        return kept[kept.size - len(self.compared) :]
 
     @property
     def compared(self) -> Signals:
@@ -118,6 +152,7 @@ def read_recording(
     units: Mapping[str, str | None] | None = None,
     temperature: str | Column | None = None,
     name: str | None = None,
+    driven: Collection[str] = (),
 ) -> Recording:
     """Read a measured file into signals named and scaled as the FMU wants them.
 
@@ -131,6 +166,8 @@ def read_recording(
         Which signal, or which column besides, gives the recording its temperature (its mean, in degC).
     name
         Name in results; default the file's name without ending.
+    driven
+        Signals that drive the FMU: they need a value at every moment.
 
     Raises
     ------
@@ -158,6 +195,9 @@ def read_recording(
     values: dict[str, FloatArray] = {}
     noise: dict[str, float] = {}
     notes: list[str] = []
+    samples: dict[str, Samples] = {}
+    left_out: dict[str, Mask] = {}
+    repairs: list[str] = []
     for signal, source in sources.items():
         if source.column is None:
             unit = source.unit or targets.get(signal) or "1"
@@ -168,12 +208,28 @@ def read_recording(
             continue
         column, t = raw[source.column], own[source.column]
         kept = (t >= grid[0]) & (t <= grid[-1])
-        check_finite(path, source.column, column.values, t, kept)
+        missing = coded(column.values, source.repair)
+        check_finite(path, source.column, column.values, t, kept & ~missing)
         with np.errstate(over="ignore", invalid="ignore"):
             numbers = source.scale * column.values + source.offset
             numbers = _to_unit(path, signal, source, column.unit, targets.get(signal), numbers)
-        check_finite(path, source.column, numbers, t, kept)
-        noise[signal] = noise_estimate(numbers[kept])
+        check_finite(path, source.column, numbers, t, kept & ~missing)
+        mended = repaired(
+            path, signal, t[kept], numbers[kept], missing[kept], source.repair, driven=signal in driven
+        )
+        measured = numbers[kept]
+        unit = targets.get(signal) or source.unit or column.unit or "1"
+        held_here = source.interpolation == "hold"
+        samples[signal] = Samples(
+            t[kept], measured, unit, mended.left_out, held_here, source.smooth == "mean"
+        )
+        repairs += mended.done
+        if mended.left_out.any():
+            numbers = numbers.copy()
+            numbers[kept] = mended.values
+            left_out[signal] = _on_grid(mended.left_out, t[kept], grid - source.shift)
+            measured = measured[~mended.left_out]
+        noise[signal] = noise_estimate(measured)
         if source.smooth == "piecewise-linear":
             fit = fit_piecewise_linear(t[kept], numbers[kept], source.noise or noise[signal])
             if fit.doubt:
@@ -189,15 +245,35 @@ def read_recording(
             held = frozenset((signal,)) if source.interpolation == "hold" else frozenset()
             values[signal] = Signals(t, {signal: numbers}, held=held).resample(grid - source.shift)[signal]
     degrees = _temperature(values, temperature, targets)
-    values.pop(_TEMPERATURE, None)
-    noise.pop(_TEMPERATURE, None)
+    for found in (values, noise, samples, left_out):
+        found.pop(_TEMPERATURE, None)
     held = frozenset(n for n in values if columns[n].interpolation == "hold")
     stamped = grid - grid[0] if axis.from_zero else grid
     signals = Signals(stamped, values, {n: targets.get(n) or columns[n].unit or "1" for n in values}, held)
-    return Recording(name or path.stem, path, sha256, signals, degrees, noise, tuple(notes), axis.lead_in)
+    return Recording(
+        name or path.stem,
+        path,
+        sha256,
+        signals,
+        degrees,
+        noise,
+        tuple(notes),
+        axis.lead_in,
+        samples,
+        left_out,
+        tuple(repairs),
+    )
 
 
 _TEMPERATURE = "\0temperature"
+
+
+def _on_grid(left_out: Mask, time: FloatArray, grid: FloatArray) -> Mask:
+    """Which points of ``grid`` (m,) s rest on samples (n,) at ``time`` that are left out."""
+    slack = 1e-6 * float(np.min(np.diff(time)))
+    before = np.clip(np.searchsorted(time, grid + slack, side="right") - 1, 0, time.size - 1)
+    after = np.clip(np.searchsorted(time, grid - slack, side="left"), 0, time.size - 1)
+    return np.asarray(left_out[before] | left_out[after])
 
 
 def _load_chosen(

@@ -1,10 +1,12 @@
 """What the terminal says about recordings: one line per finding."""
 
+from collections.abc import Sequence
+
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from thsa_cosim.inspection import FileReport, Finding, Inspection
+from thsa_cosim.inspection import FileReport, Finding, Inspection, Trust
 
 STYLES = {"note": "dim", "warning": "yellow", "error": "red"}
 
@@ -19,17 +21,52 @@ def print_file(console: Console, report: FileReport) -> None:
         noise = "" if role else f"{column.noise:.3g}"
         table.add_row(Text(column.name + role), Text(column.unit or "not stated"), noise)
     console.print(table)
-    print_inspection(console, report.data)
+    print_inspection(console, report.data, remedies=True)
     console.print(f"verdict: {report.to_dict()['verdict']}", highlight=False)
 
 
-def print_inspection(console: Console, data: Inspection) -> None:
-    """Print one line per finding, the gravest first."""
+def print_inspection(
+    console: Console, data: Inspection, *, notes: bool = True, remedies: bool = False
+) -> None:
+    """Print one line per finding, the gravest first, and one per repair.
+
+    Without ``notes`` only warnings and errors; with ``remedies`` also the lines for the scenario that deal with them.
+    """
     for finding in data.findings:
-        console.print(_line(finding), soft_wrap=True)
+        if notes or finding.severity != "note":
+            console.print(_line(finding), soft_wrap=True)
+    for sentence in data.repairs:
+        console.print(Text(f"repaired: {sentence}"), soft_wrap=True)
+    lines = list(dict.fromkeys(f.remedy for f in data.findings if f.remedy and f.severity != "note"))
+    if remedies and lines:
+        console.print("\nLines for the scenario that would deal with it (each is a choice of yours):")
+        for text in _merged(lines):
+            console.print(Text(text), soft_wrap=True)
+
+
+def _merged(remedies: Sequence[str]) -> list[str]:
+    """One table per heading, with the keys of all remedies below it."""
+    tables: dict[str, dict[str, None]] = {}
+    for remedy in remedies:
+        heading, _, keys = remedy.partition("\n")
+        tables.setdefault(heading, {}).update(dict.fromkeys(keys.splitlines()))
+    return ["\n".join((heading, *keys)) for heading, keys in tables.items()]
 
 
 def _line(finding: Finding) -> Text:
     line = Text(f"{finding.severity}: ", style=STYLES[finding.severity])
     line.append(f"{finding.recording}, {finding.channel}: {finding.kind}: {finding.text}", style="default")
     return line
+
+
+def print_trust(console: Console, trust: Trust) -> None:
+    """Print why a fit does not explain its recordings; nothing if it does."""
+    if trust.verdict == "explained":
+        return
+    line = Text("not explained: ", style="red")
+    line.append(
+        "the values above are not to be believed, since the model leaves more than noise", style="default"
+    )
+    console.print(line, soft_wrap=True)
+    for reason in trust.reasons:
+        console.print(Text(f"  {reason}"), soft_wrap=True)

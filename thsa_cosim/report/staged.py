@@ -7,6 +7,7 @@ from typing import Any
 from rich.console import Console
 
 from thsa_cosim import __version__
+from thsa_cosim.inspection import Inspection
 from thsa_cosim.report.files import RESULT, write_json
 from thsa_cosim.report.identify.files import write_identify
 from thsa_cosim.report.identify.result import identify_to_dict
@@ -47,6 +48,8 @@ def staged_to_dict(result: StagedResult) -> dict[str, Any]:
             "validate": _merged_errors({name: _over_recordings(check) for name, check in checks.items()}),
         },
         "stages": {**parts, **checks},
+        "data": _merged_data(result),
+        "trust": _merged_trust(parts),
         "notes": list(result.notes),
     }
 
@@ -73,6 +76,19 @@ def print_staged(console: Console, result: StagedResult) -> None:
             print_identify(console, result.identified[stage.name])
         elif stage.name in result.simulated:
             print_simulate(console, result.simulated[stage.name])
+
+
+def _merged_data(result: StagedResult) -> dict[str, Any]:
+    """The findings of all stages."""
+    found = [stage.scenario.data for stage in result.scenario.stages]
+    findings = tuple(f for data in found for f in data.findings)
+    return Inspection.of(findings, tuple(s for data in found for s in data.repairs)).to_dict()
+
+
+def _merged_trust(parts: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Explained if every identified stage is."""
+    reasons = [f"{name}: {reason}" for name, part in parts.items() for reason in part["trust"]["reasons"]]
+    return {"verdict": "not-explained" if reasons else "explained", "reasons": reasons}
 
 
 def _merged_points(parts: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:

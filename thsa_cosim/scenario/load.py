@@ -181,7 +181,8 @@ def _recordings(
     parts_held_out: bool,
 ) -> dict[str, tuple[Recording, ...]]:
     """Read the files of each role; parts cut the fit files, ``parts_held_out``: into both roles."""
-    columns = {name: Column(**column.model_dump()) for name, column in table.recordings.columns.items()}
+    columns = {name: column.source() for name, column in table.recordings.columns.items()}
+    driven = frozenset(name for name in columns if description.variables[name].causality == "input")
     units = {name: description.variables[name].unit or None for name in columns}
     source = table.temperature
     temperature: str | Column | None = None
@@ -192,7 +193,9 @@ def _recordings(
 
     def read(role: str, path: Path, axis: TimeAxis, name: str) -> None:
         found[role].append(
-            read_recording(path, columns, time=axis, units=units, temperature=temperature, name=name)
+            read_recording(
+                path, columns, time=axis, units=units, temperature=temperature, name=name, driven=driven
+            )
         )
 
     for role, paths in files.items():

@@ -3,11 +3,14 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
+from statistics import median
 from typing import Literal
 
 from thsa_cosim.errors import ScenarioError
 from thsa_cosim.fmu import FmuDescription
+from thsa_cosim.inspection import Inspection, inspect
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario.schema import CommonTable
@@ -135,6 +138,7 @@ class SimulationSpec:
     inputs: Literal["hold", "mean", "derivative", "intermediate"] | None = None
     tolerance: float | None = None
     step: float | None = None
+    stepping: Literal["free", "samples"] = "free"
     deadline: float = 60.0
     memory_mb: float | None = None
     reuse: Literal["fresh", "reset"] = "fresh"
@@ -195,6 +199,11 @@ class Scenario:
     diagnose: DiagnoseSpec | None = None
     """Of a diagnosis only."""
 
+    @cached_property
+    def data(self) -> Inspection:
+        """What an inspection finds in the recordings."""
+        return inspect((*self.fit, *self.validate), self.inputs)
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What the recordings' reader has to say about them."""
@@ -205,9 +214,14 @@ class Scenario:
         return recording.signals.select(self.inputs)
 
     def noise(self, recording: Recording, channel: str) -> float:
-        """Return a channel's noise (FMU unit, above 0): the scenario's, else the recording's own estimate."""
+        """Return a channel's noise (FMU unit, above 0): the scenario's, else the sensor's.
+
+        One sensor has one noise: the median of what the fit recordings show, or of the recording itself without any.
+        """
         spec = self.cost.channels.get(channel)
-        noise = spec.noise if spec is not None and spec.noise is not None else recording.noise[channel]
+        own = recording.noise[channel]
+        seen = [r.noise[channel] for r in self.fit if r.noise.get(channel, 0.0) > 0.0]
+        noise = spec.noise if spec is not None and spec.noise is not None else median(seen or [own])
         if not noise > 0 or not math.isfinite(noise):
             raise ScenarioError(
                 f"{self.path}: no noise can be seen on {channel!r} in {recording.path};"

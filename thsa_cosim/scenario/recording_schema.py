@@ -1,12 +1,22 @@
 """The tables of a scenario file that say what was measured: files, time, signals, temperature."""
 
 import math
+from dataclasses import fields
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from thsa_cosim.scenario.table import Moderate, Name, NotNegative, Positive, Table, check_order
+from thsa_cosim.recordings import Column, Repair
+from thsa_cosim.scenario.table import (
+    Moderate,
+    Name,
+    NotNegative,
+    Positive,
+    Table,
+    check_order,
+    check_pairs,
+)
 
 
 class TimeTable(Table):
@@ -65,6 +75,21 @@ class ColumnTable(Table):
     estimated."""
     interpolation: Literal["linear", "hold"] = "linear"
     """``"hold"``: the value stays until the next sample, as a digital command does."""
+    missing: list[Moderate] | None = None
+    """Numbers of the file that mean "no value", such as ``[-9999.0]``; with any list, also ``[]``, blank cells mean it,
+    too. Such samples are left out: an output is not compared there, an input runs straight over them."""
+    below: Moderate | None = None
+    """Samples at or below this, in the FMU variable's unit, are left out: where a sensor clips, it gives a bound."""
+    above: Moderate | None = None
+    """The same at or above."""
+    mask: list[list[float]] = Field(default_factory=list)
+    """Pairs ``[from, to]`` in s of the file's time that are left out of this signal."""
+    despike: bool = False
+    """Leave out spikes of one or two samples (Hampel's test against their neighbours)."""
+    independent: bool = False
+    """Of a slow channel in a fast table, leave out the samples that are held or interpolated."""
+    fill: NotNegative = 0.1
+    """s; the longest stretch without value that an input may run straight over."""
 
     @model_validator(mode="after")
     def _one_source(self) -> "ColumnTable":
@@ -82,6 +107,20 @@ class ColumnTable(Table):
                 "'noise' goes with smooth = 'piecewise-linear'; a compared output's is [cost.channels]'s",
             )
         return self
+
+    @field_validator("mask")
+    @classmethod
+    def _mask(cls, mask: list[list[float]]) -> list[list[float]]:
+        return check_pairs(mask)
+
+    def source(self) -> Column:
+        """Return it as the reader of recordings wants it."""
+        given = self.model_dump()
+        names = [f.name for f in fields(Repair)]
+        repair = {name: given.pop(name) for name in names}
+        repair["mask"] = tuple((a, b) for a, b in repair["mask"])
+        repair["missing"] = None if repair["missing"] is None else tuple(repair["missing"])
+        return Column(**given, repair=Repair(**repair))
 
 
 class PartTable(Table):

@@ -38,6 +38,7 @@ def open_runner(
             deadline_s=spec.deadline,
             memory_limit_mb=spec.memory_mb,
             reuse=spec.reuse,
+            stepping=spec.stepping,
             kind=settled.interface,
         )
     else:
@@ -47,6 +48,7 @@ def open_runner(
             deadline_s=spec.deadline,
             memory_limit_mb=spec.memory_mb,
             reuse=spec.reuse,
+            stepping=spec.stepping,
             kind=settled.interface,
         )
     runner.notes = settled.notes

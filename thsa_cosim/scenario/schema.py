@@ -12,7 +12,7 @@ from thsa_cosim.errors import did_you_mean
 from thsa_cosim.laws import FORMS
 from thsa_cosim.scenario.recording_schema import RecordingsTable, TemperatureTable
 from thsa_cosim.scenario.system_schema import ModelTable
-from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order
+from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order, check_pairs
 from thsa_cosim.search.strategies import SearchMethod, Strategy
 
 
@@ -150,10 +150,7 @@ class CostTable(Table):
     @field_validator("mask")
     @classmethod
     def _mask(cls, mask: list[list[float]]) -> list[list[float]]:
-        for pair in mask:
-            if len(pair) != 2 or not pair[0] < pair[1]:
-                raise PydanticCustomError("mask", "must hold pairs [from, to] in s with from below to")
-        return mask
+        return check_pairs(mask)
 
 
 class EvolutionTable(Table):
@@ -198,6 +195,9 @@ class SimulationTable(Table):
     """Relative tolerance handed to the FMU (or to CVODE); left out: the FMU's own."""
     step: Positive | None = None
     """s between communication points; left out: the recording's samples."""
+    stepping: Literal["free", "samples"] = "free"
+    """An FMU that this package exported is given the whole run at once, so that its solver steps across samples;
+    ``"samples"`` communicates at every one of them, as with other FMUs."""
     deadline: Positive = 60.0
     """s; a run that takes longer is killed and counts as failed."""
     memory: Positive | None = None

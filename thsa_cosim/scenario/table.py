@@ -50,3 +50,11 @@ def check_order(start: float | None, stop: float | None) -> None:
     """Raise for a start that does not lie before its stop."""
     if start is not None and stop is not None and not start < stop:
         raise PydanticCustomError("order", "start must lie before stop")
+
+
+def check_pairs(pairs: list[list[float]]) -> list[list[float]]:
+    """Return ``pairs``; raise for one that is not [from, to] in order."""
+    for pair in pairs:
+        if len(pair) != 2 or not pair[0] < pair[1]:
+            raise PydanticCustomError("mask", "must hold pairs [from, to] in s with from below to")
+    return pairs

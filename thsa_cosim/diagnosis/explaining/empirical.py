@@ -13,7 +13,7 @@ from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Variant
 from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, write_extended
 from thsa_cosim.diagnosis.catalogue.slots import find_slots
-from thsa_cosim.diagnosis.catalogue.superset import scales_of, this_platform
+from thsa_cosim.diagnosis.catalogue.superset import scales_of
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import values_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
@@ -23,6 +23,7 @@ from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import EmpiricalLaw, EmpiricalTerm
 from thsa_cosim.export import export_fmu
+from thsa_cosim.export.compile import this_platform
 from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
 
 #: At most so many terms: a law of more says no more than a plot.

@@ -10,6 +10,7 @@
 #include <string.h>
 #include "fmi2Functions.h"
 #include "instance.h"
+#include "trajectory.h"
 
 typedef struct {
     Instance core; /* first member: an Instance * is a Component * */
@@ -303,6 +304,19 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     (void)noSetFMUStatePriorToCurrentPoint; /* one-step method: going back needs no memory of the past */
     REQUIRE(STEP_MODE, CO_SIMULATION);
     const Status status = instance_do_step(CORE, currentCommunicationPoint, communicationStepSize);
+    if (status == DISCARD) CORE->s.phase = STEP_FAILED;
+    return (fmi2Status)status;
+}
+
+/* Beside the FMI: a whole run in one call (trajectory.h). */
+#define thsaTrajectory1 fmi2FullName(thsaTrajectory1)
+
+FMI2_Export fmi2Status thsaTrajectory1(fmi2Component c, Trajectory *run);
+
+fmi2Status thsaTrajectory1(fmi2Component c, Trajectory *run) {
+    REQUIRE(STEP_MODE, CO_SIMULATION);
+    REQUIRE_ARRAYS(1, run, run);
+    const Status status = trajectory_run(CORE, run);
     if (status == DISCARD) CORE->s.phase = STEP_FAILED;
     return (fmi2Status)status;
 }

@@ -7,6 +7,8 @@
  * Inputs within a communication step: FMI 3 has no input derivatives. If the importer names inputs among its
  * required intermediate variables, it is asked for them at the end of each internal step before that step is
  * done, and they are interpolated linearly; otherwise inputs are constant over the communication step.
+ * An importer that allows early return may end a communication step at any intermediate update that follows an internal
+ * step, by asking for a return at a time that has been reached.
  * Event Mode in Co-Simulation is optional: with eventModeUsed the importer may announce jumps of inputs; the
  * model's own events are handled inside fmi3DoStep in both cases. Scheduled Execution and clocks do not exist.
  */
@@ -14,6 +16,7 @@
 #include <string.h>
 #include "fmi3Functions.h"
 #include "instance.h"
+#include "trajectory.h"
 
 typedef struct {
     Instance core; /* first member: an Instance * is a Component * */
@@ -21,7 +24,8 @@ typedef struct {
     fmi3LogMessageCallback log_message;
     fmi3IntermediateUpdateCallback intermediate_update;
     int may_set, may_get; /* in intermediate update */
-    int event_mode_used;  /* survives a reset */
+    int event_mode_used;  /* survives a reset, as does: */
+    int may_return;       /* early, after an intermediate update */
 } Component;
 
 enum {
@@ -50,12 +54,14 @@ static fmi3Status refuse(fmi3Instance instance, const char *function, const char
 static void call_back(Component *self, double time, int set, int get, int finished) {
     fmi3Boolean early = fmi3False;
     fmi3Float64 early_time = time;
+    const int can_return = finished && self->may_return;
     self->may_set = set;
     self->may_get = get;
     self->core.s.phase = INTERMEDIATE;
-    self->intermediate_update(self->environment, time, set != 0, get != 0, finished != 0, fmi3False, &early,
-                              &early_time);
+    self->intermediate_update(self->environment, time, set != 0, get != 0, finished != 0, can_return != 0,
+                              &early, &early_time);
     self->core.s.phase = IN_STEP;
+    if (can_return && early && early_time <= time) self->core.return_early = 1;
 }
 
 /* Ask for the inputs at the end of the internal step and interpolate linearly from the present ones. */
@@ -125,10 +131,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     Component *self;
     (void)resourcePath;
     (void)visible;
-    (void)earlyReturnAllowed; /* never returns early */
     self = create(CO_SIMULATION, instanceName, instantiationToken, loggingOn, instanceEnvironment, logMessage);
     if (!self) return NULL;
     self->event_mode_used = eventModeUsed;
+    self->may_return = earlyReturnAllowed;
     self->intermediate_update = intermediateUpdate;
     if (!intermediateUpdate) return self;
     for (size_t i = 0; requiredIntermediateVariables && i < nRequiredIntermediateVariables; i++) {
@@ -520,6 +526,19 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     const Status status = instance_do_step(CORE, currentCommunicationPoint, communicationStepSize);
     *lastSuccessfulTime = CORE->s.now.time;
+    *earlyReturn = status == OK && CORE->return_early && CORE->s.now.time < currentCommunicationPoint + communicationStepSize;
+    return (fmi3Status)status;
+}
+
+/* Beside the FMI: a whole run in one call (trajectory.h). */
+#define thsaTrajectory1 fmi3FullName(thsaTrajectory1)
+
+FMI3_Export fmi3Status thsaTrajectory1(fmi3Instance instance, Trajectory *run);
+
+fmi3Status thsaTrajectory1(fmi3Instance instance, Trajectory *run) {
+    REQUIRE(STEP_MODE, CO_SIMULATION);
+    REQUIRE_ARRAYS(1, run, run);
+    const Status status = trajectory_run(CORE, run);
     return (fmi3Status)status;
 }
 

@@ -390,6 +390,7 @@ Status instance_do_step(Instance *c, double from, double size) {
         s->derivatives_used = 1;
         const Motion before = s->now;
         s->phase = IN_STEP;
+        c->return_early = 0;
         const Status status = solver_advance(c, end);
         s->phase = STEP_MODE;
         if (status != OK) {

@@ -29,7 +29,6 @@ enum { RODAS_STAGES = 8 };
 typedef struct {
     double time;
     double step;             /* step size the controller remembers; 0 = none yet */
-    double last_error;       /* scaled error of the last accepted step (PI control) */
     double x[N_X + 1], u[N_U + 1], m[N_G + 1];
     double span[N_G + 1];    /* largest |g| seen: scale of the dead band that rounding noise cannot leave */
 } Motion;
@@ -50,6 +49,7 @@ typedef struct {
 } State;
 
 typedef struct Instance Instance;
+typedef struct Recorder Recorder;
 
 struct Instance {
     State s;
@@ -58,6 +58,8 @@ struct Instance {
     void (*emit)(Instance *, Status, const char *category, const char *message);
     void (*before_step)(Instance *, double time);  /* FMI 3 intermediate update: inputs wanted at `time` */
     void (*after_step)(Instance *);                /* FMI 3 intermediate update: an internal step is done */
+    int return_early;        /* after_step was told to end the communication step where it is */
+    Recorder *recorder;      /* of the trajectory that is running (trajectory.c), else NULL */
 
     /* caches: valid for the present (time, x, u, p, m) */
     int dx_valid, y_valid, w_valid, g_valid;

@@ -146,10 +146,10 @@ int solver_linearize(Instance *c) {
     return 0;
 }
 
-/* Upper half of the digits (T. Dekker, Numer. Math. 18 (1971) 224): equal for communication steps that differ by the
- * rounding of time only, so that their matrix is factorized once. */
+/* The first 33 bits (T. Dekker, Numer. Math. 18 (1971) 224): equal for communication steps that differ by the rounding of
+ * time only, so that their matrix is factorized once, and close enough to h for a tolerance of 1e-11. */
 static double leading_digits(double h) {
-    const double wide = 134217729.0 * h; /* 2^27 + 1 */
+    const double wide = 1048577.0 * h; /* 2^20 + 1 */
     return wide - (wide - h);
 }
 

@@ -12,6 +12,9 @@ void solver_dense_prepare(Instance *c);        /* before solver_dense; the stage
 void solver_dense(const Instance *c, double theta, double *x);  /* states at time + theta*h */
 double solver_tolerance(const Instance *c);    /* tolerance that the step control uses */
 
+Status trajectory_record(Instance *c, double h, double until, int inclusive); /* rows within the step just done */
+double trajectory_spacing(const Instance *c);  /* mean distance of rows */
+
 Status solver_advance(Instance *c, double end);  /* integrate to `end`; logs its reason when it fails */
 
 #endif

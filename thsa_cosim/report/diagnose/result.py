@@ -10,6 +10,7 @@ import pandas as pd
 
 from thsa_cosim.diagnosis.results import ChannelError, DiagnosisResult, EmpiricalLaw, Errors, Value
 from thsa_cosim.identify import ForceBalance
+from thsa_cosim.inspection import judge_ratios
 from thsa_cosim.report.files import RESULT, write_json
 from thsa_cosim.report.page.pictures import write_pictures
 from thsa_cosim.report.signal_files import write_signals
@@ -85,6 +86,8 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
             "present": result.experiment.present,
             "file": "experiment.csv",
         },
+        "data": result.data.to_dict(),
+        "trust": judge_ratios(_ratios(result.after if result.after["fit"] else result.before)).to_dict(),
         "notes": list(result.notes),
         "seed": result.seed,
         "evaluations": result.evaluations,
@@ -93,6 +96,11 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
         "scenario": str(result.scenario),
         "version": result.version,
     }
+
+
+def _ratios(errors: Errors) -> dict[str, float]:
+    """rmse over noise of every fitted signal."""
+    return {name: e.rmse / e.noise for name, e in errors["fit"].items() if e.noise > 0.0}
 
 
 def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:

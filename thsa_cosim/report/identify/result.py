@@ -43,6 +43,8 @@ def identify_to_dict(result: IdentifyResult) -> dict[str, Any]:
                 }
                 for comparison in result.comparisons
             ],
+            "data": result.data.to_dict(),
+            "trust": result.trust.to_dict(),
             "notes": list(result.notes),
         }
     )

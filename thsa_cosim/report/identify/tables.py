@@ -8,6 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from thsa_cosim.identify.results import ForceBalance, IdentifyResult, PointResult
+from thsa_cosim.report.inspection import print_trust
 from thsa_cosim.report.parts.text import number, percent
 from thsa_cosim.report.simulate.tables import error_cells
 
@@ -23,6 +24,7 @@ def print_identify(console: Console, result: IdentifyResult) -> None:
         console.print(errors_table(result))
     if result.force is not None:
         console.print(Text(force_sentence(result.force)), highlight=False)
+    print_trust(console, result.trust)
     for note in result.notes:
         console.print(Text(f"note: {note}"), highlight=False)
 

@@ -24,6 +24,7 @@ from thsa_cosim.report.page.summary import summary
 from thsa_cosim.report.parts.comparison import comparison
 from thsa_cosim.report.parts.content import Block, Figure, Fold, Section
 from thsa_cosim.report.parts.convergence import convergence
+from thsa_cosim.report.parts.data import data
 from thsa_cosim.report.parts.failures import failures
 from thsa_cosim.report.parts.provenance import provenance
 from thsa_cosim.report.tune.gains import gains
@@ -38,9 +39,9 @@ SectionOf = Callable[[Part], Section | None]
 
 #: Sections of a part by kind of study, in the order of the page.
 SECTIONS: dict[str, tuple[SectionOf, ...]] = {
-    "identify": (comparison, convergence, correlation),
-    "simulate": (comparison,),
-    "diagnose": (attribution, before_after, structure, recordings, candidates, convergence),
+    "identify": (data, comparison, convergence, correlation),
+    "simulate": (data, comparison),
+    "diagnose": (data, attribution, before_after, structure, recordings, candidates, convergence),
     "tune": (gains, responses, plane, schedule, pareto, convergence),
 }
 

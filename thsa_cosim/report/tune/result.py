@@ -66,6 +66,9 @@ def tune_to_dict(result: TuneResult) -> dict[str, Any]:
             }
             for group in result.groups
         ],
+        # A tuning has no recordings; it believes its model.
+        "data": {"verdict": "good", "findings": []},
+        "trust": {"verdict": "explained", "reasons": []},
         "notes": list(result.notes),
     }
     plain: dict[str, Any] = _plain(content)

@@ -1,0 +1,102 @@
+"""All detectors over recordings."""
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+
+import numpy as np
+
+from thsa_cosim.inspection.across import across_findings
+from thsa_cosim.inspection.channel import Channel
+from thsa_cosim.inspection.course import moving_start, temperature_drift, unequal_noise
+from thsa_cosim.inspection.finding import Finding, Inspection
+from thsa_cosim.inspection.outliers import outliers
+from thsa_cosim.inspection.samples import dependent_samples, resolution, sentinels
+from thsa_cosim.inspection.spectrum import hum
+from thsa_cosim.inspection.stretches import clipped, repeated, stuck
+from thsa_cosim.inspection.time_axis import time_findings
+from thsa_cosim.recordings import Recording
+from thsa_cosim.signals import FloatArray
+
+CHANNEL_DETECTORS: tuple[Callable[[Channel], Iterator[Finding]], ...] = (
+    sentinels,
+    dependent_samples,
+    resolution,
+    clipped,
+    stuck,
+    repeated,
+    outliers,
+    hum,
+    unequal_noise,
+    temperature_drift,
+    moving_start,
+)
+_LEAST = 16
+_APART = 1.6
+"""Ratio of one sensor's noise in one recording to that in the others."""
+
+
+def inspect(recordings: Sequence[Recording], inputs: Collection[str]) -> Inspection:
+    """Inspect recordings as a scenario reads them, less what its repairs leave out; ``inputs`` drive the FMU."""
+    findings: list[Finding] = []
+    for recording in recordings:
+        channels = [_channel(recording, name, name in inputs) for name in recording.samples]
+        times = _different([s.time for s in recording.samples.values()])
+        findings += inspect_channels(recording.name, channels, times)
+        if recording.lead_in > 0.0:
+            findings = [f for f in findings if (f.recording, f.kind) != (recording.name, "moving-start")]
+    return Inspection.of((*findings, *_noises(recordings, inputs)), repairs_of(recordings))
+
+
+def repairs_of(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """What the scenario's repairs did to the recordings: sentences."""
+    return tuple(f"{r.name}: {sentence}" for r in recordings for sentence in r.repairs)
+
+
+def inspect_channels(
+    recording: str, channels: Sequence[Channel], times: Sequence[FloatArray]
+) -> Iterator[Finding]:
+    """Yield the findings on a recording's time axes (in s, in the file's order), on each channel and across them."""
+    for time in times:
+        yield from time_findings(recording, time)
+    usable = [c for c in channels if c.values.size >= _LEAST and c.plain.min() < c.plain.max()]
+    for channel in usable:
+        for detect in CHANNEL_DETECTORS:
+            yield from detect(channel)
+    yield from across_findings(usable)
+
+
+def _channel(recording: Recording, name: str, driven: bool) -> Channel:
+    samples = recording.samples[name]
+    kept = ~samples.left_out
+    return Channel(
+        recording=recording.name,
+        name=name,
+        unit=samples.unit,
+        role="input" if driven else "output",
+        time=samples.time[kept],
+        values=samples.values[kept],
+        held=samples.held,
+        averaged=samples.averaged,
+    )
+
+
+def _different(times: Sequence[FloatArray]) -> list[FloatArray]:
+    """The time axes that differ from each other."""
+    found: list[FloatArray] = []
+    for time in times:
+        if not any(time is other or np.array_equal(time, other) for other in found):
+            found.append(time)
+    return found
+
+
+def _noises(recordings: Sequence[Recording], inputs: Collection[str]) -> Iterator[Finding]:
+    """One sensor has one noise: a recording in which it is another was made with something else."""
+    names = dict.fromkeys(name for r in recordings for name in r.samples if name not in inputs)
+    for name in names:
+        noises = {r.name: r.noise[name] for r in recordings if r.noise.get(name, 0.0) > 0.0}
+        if len(noises) < 2:
+            continue
+        usual = float(np.median(list(noises.values())))
+        for recording, noise in noises.items():
+            if not usual / _APART < noise < usual * _APART:
+                text = f"the noise of {name} is {noise:.3g} here and {usual:.3g} in the recordings together"
+                yield Finding(recording, name, "unequal-noise", "warning", text)

@@ -37,7 +37,7 @@ PLATFORMS = (
 )
 
 
-def this_platform() -> Platform:
+def native_platform() -> Platform:
     """The platform that this process runs on; ThsaCosimError if nothing can be built for it."""
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine_name().lower(), machine_name().lower())
     system = {"linux": "linux", "darwin": "darwin", "win32": "windows"}.get(sys.platform, sys.platform)

@@ -17,7 +17,7 @@ from io import BytesIO
 from pathlib import Path
 
 from thsa_cosim.errors import ThsaCosimError
-from thsa_cosim.export.compile import Platform, compile_library, this_platform
+from thsa_cosim.export.compile import Platform, compile_library, native_platform
 from thsa_cosim.export.merge_description import merged_description
 from thsa_cosim.export.merge_source import Glue, Member, layout, member_source, merged_source
 from thsa_cosim.system.description import SystemDescription
@@ -174,7 +174,7 @@ def _build(
     guid = f"{{{code[:8]}-{code[8:12]}-{code[12:16]}-{code[16:20]}-{code[20:32]}}}"
     config = _config(glue, guid)
     xml = merged_description(glue, documents, config, guid, IDENTIFIER, description.default_experiment)
-    platform = this_platform()
+    platform = native_platform()
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="thsa-cosim-merge-") as scratch:
         folder = Path(scratch)

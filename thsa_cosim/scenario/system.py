@@ -24,6 +24,11 @@ def open_model(
         return _compiled(Path(replaced_by), table)
     if table.fmu:
         return _compiled(path.parent / table.fmu, table)
+    return _compiled(assemble_tables(path, table), table)
+
+
+def assemble_tables(path: Path, table: ModelTable) -> Path:
+    """Return the archive of the system that the tables of the scenario ``path`` describe."""
     parts = [
         Part(
             c.name,
@@ -39,9 +44,9 @@ def open_model(
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise ScenarioError(f"components: two are named {twice!r}; give each its own name.")
-    wires = [Wire(c.source, c.target, c.factor, c.offset) for c in table.connections]
+    wires = [Wire(c.source, c.target, c.factor, c.offset, c.convert) for c in table.connections]
     pins = {name: [given] if isinstance(given, str) else given for name, given in table.connectors.items()}
-    return _compiled(assembled(path.stem, parts, wires, pins), table)
+    return assembled(path.stem, parts, wires, pins)
 
 
 def _compiled(path: Path, table: ModelTable) -> FmuDescription:

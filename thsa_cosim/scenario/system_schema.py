@@ -37,7 +37,9 @@ class ConnectionTable(Table):
     factor: Moderate = 1.0
     """input = factor * output + offset, before units are converted."""
     offset: Moderate = 0.0
-    """In the output's unit, times ``factor``."""
+    """In the output's unit."""
+    convert: bool = True
+    """Convert units; false: ``factor`` and ``offset`` do it."""
 
 
 class ModelTable(Table):

@@ -45,6 +45,7 @@ class Wire:
     target: str
     factor: float = 1.0
     offset: float = 0.0
+    convert: bool = True
 
 
 def assemble(
@@ -68,7 +69,9 @@ def assemble(
         components.append(Component(part.name, fmu, source, execution, dict(part.start), step, part.delay))
 
     by_name = {component.name: component.fmu for component in components}
-    links = [Connection(_pin(w.source, names), _pin(w.target, names), w.factor, w.offset) for w in wires]
+    links = [
+        Connection(_pin(w.source, names), _pin(w.target, names), w.factor, w.offset, w.convert) for w in wires
+    ]
     outside = [
         _connector(shown, [_pin(pin, names) for pin in pins], by_name) for shown, pins in connectors.items()
     ]

@@ -13,6 +13,9 @@ from thsa_cosim.diagnosis.catalogue.slots import INPUTS, OUTPUTS, Slot
 from thsa_cosim.export import export_fmu
 from thsa_cosim.export.compile import this_platform
 
+#: Extended models are named after their own class; the system model of the shipped package goes by the package's name.
+KNOWN_AS = {"THSA.Actuator": "THSA"}
+
 
 def extended_class(
     name: str,
@@ -76,7 +79,8 @@ def write_extended_model(
     """
     base = qualified(model, package)
     effects = list(dict.fromkeys(c.effect.name for c in candidates))
-    name = "_and_".join([f"{base.split('.')[0]}_with_{effects[0]}", *effects[1:]]).replace("-", "_")
+    own = KNOWN_AS.get(base, base.split(".")[-1])
+    name = "_and_".join([f"{own}_with_{effects[0]}", *effects[1:]]).replace("-", "_")
     titles = ", ".join(dict.fromkeys(c.effect.title for c in candidates))
     source = extended_class(name, base, candidates, values, f"{base} with: {titles}")
     file = write_extended(folder, name, source)

@@ -6,8 +6,8 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from thsa_cosim.errors import FmuError, ScenarioError
-from thsa_cosim.scenario.source import read_toml
 from thsa_cosim.scenario.sentences import from_validation, one_line
+from thsa_cosim.scenario.source import read_toml
 from thsa_cosim.scenario.system import assemble_tables
 from thsa_cosim.scenario.system_schema import ModelTable
 

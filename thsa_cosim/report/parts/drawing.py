@@ -123,6 +123,7 @@ def _finish(axes: Axes, layout: Mapping[str, Any], first: str, second: str) -> N
     if not lowest:
         axes.xaxis.set_tick_params(labelbottom=False)
     axes.tick_params(labelsize=8)
+    axes.yaxis.get_offset_text().set(fontsize=7, x=-0.1)
     axes.grid(True, color="0.9", lw=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):

@@ -116,11 +116,9 @@ def _scenario(path: Path, deadline: float) -> Checked:
     from thsa_cosim.inspection import Inspection
     from thsa_cosim.report.check import print_check
     from thsa_cosim.report.inspection import print_inspection
-    from thsa_cosim.scenario import Scenario, StagedScenario, load_tune
-    from thsa_cosim.scenario.load import read_toml
-    from thsa_cosim.scenario.stages import load_study
+    from thsa_cosim.scenario import Scenario, StagedScenario, load
 
-    loaded = load_tune(path) if read_toml(path).get("kind") == "tune" else load_study(path)
+    loaded = load(path)
     scenarios = (
         [stage.scenario for stage in loaded.stages] if isinstance(loaded, StagedScenario) else [loaded]
     )

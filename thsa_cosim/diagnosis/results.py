@@ -99,6 +99,28 @@ class Dependence:
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """What a balance misses over its ``cause``, in bins (n,): measured with standard errors, and by both models.
+
+    ``left`` is the signal on the balance's left side, whose ``unit`` the residual has; ``part`` the recordings;
+    ``share`` of the residual's power that depends on the cause. ``before`` and ``after`` are NaN where there is none.
+    """
+
+    equation: str
+    unit: str
+    left: str
+    part: str
+    cause: str
+    cause_unit: str
+    share: float
+    at: tuple[float, ...]
+    measured: tuple[float, ...]
+    stderr: tuple[float, ...]
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class SeparatingExperiment:
     """The experiment that tells rivals apart best: ``inputs`` over time, ``distance`` in variances of the noise."""
 
@@ -177,6 +199,7 @@ class DiagnosisResult:
     """Of an FMU without source, in place of the two: the effects around it."""
     judged: tuple[Judged, ...]
     balances: tuple[Balance, ...]
+    evidence: Evidence | None
     dependence: tuple[Dependence, ...]
     empirical: EmpiricalLaw | None
     equivalence: tuple[EquivalenceClass, ...]

@@ -24,6 +24,7 @@ from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.explaining.balance import close_balances
 from thsa_cosim.diagnosis.explaining.dependence import dependence
 from thsa_cosim.diagnosis.explaining.empirical import LawSearch, law_of
+from thsa_cosim.diagnosis.explaining.evidence import evidence
 from thsa_cosim.diagnosis.explaining.experiment import separating_experiment
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
@@ -183,6 +184,7 @@ class _Closing:
         for identified in (before, after) if changed else (before,):
             for reason, count in identified.failures.items():
                 counts[reason] = counts.get(reason, 0) + count
+        balances = close_balances(scenario, self.spec)
         return DiagnosisResult(
             title=scenario.title or scenario.path.stem,
             status="complete",
@@ -204,7 +206,8 @@ class _Closing:
             extended_fmu=extended,
             wrapper=wrapper,
             judged=judged(found),
-            balances=close_balances(scenario, self.spec),
+            balances=balances,
+            evidence=evidence(scenario, balances, self.trials, before, after if changed else None),
             dependence=dependence(scenario, self.trials, before, after),
             empirical=law,
             equivalence=equivalence(found),

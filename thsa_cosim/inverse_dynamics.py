@@ -12,7 +12,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
 
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -34,6 +33,8 @@ def low_pass(values: FloatArray, cutoff: float, step: float, order: int = 4) -> 
 
     The ends are extended oddly by three times the order, as MATLAB's ``filtfilt`` does.
     """
+    from scipy import signal  # half a second to import, and few studies filter
+
     numerator, denominator = signal.butter(order, 2.0 * cutoff * step)
     return zero_phase(numerator, denominator, values)
 

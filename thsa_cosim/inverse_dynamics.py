@@ -97,5 +97,7 @@ def repeatability(values: FloatArray, period: int) -> float:
 
 def zero_phase(numerator: FloatArray, denominator: FloatArray, values: FloatArray) -> FloatArray:
     """Filter values (n,) forwards and backwards, its ends extended oddly by three times the order."""
+    from scipy import signal  # half a second to import, and few studies filter
+
     reach = 3 * (max(len(numerator), len(denominator)) - 1)
     return np.asarray(signal.filtfilt(numerator, denominator, values, padlen=min(reach, values.size - 1)))

@@ -38,6 +38,11 @@ from thsa_cosim.shipped import modelica_package
     show_default=True,
     help="Exporter: ours, or OpenModelica.",
 )
+@click.option(
+    "--ssp",
+    is_flag=True,
+    help="MODEL is a scenario that describes a system of FMUs: write it as an SSP archive for other tools.",
+)
 @click.option("--platforms", default=None, help="Comma-separated FMI platforms, for example win64,linux64.")
 def export(
     model: str | None,
@@ -47,9 +52,11 @@ def export(
     fmi: str,
     output: Path | None,
     compiler: str,
+    ssp: bool,
     platforms: str | None,
 ) -> None:
     """Export the Modelica class MODEL (or a .mo file's class) as an FMU."""
+
     from thsa_cosim.export import export_fmu, list_models
 
     if listing:
@@ -59,6 +66,11 @@ def export(
         raise click.UsageError(
             "MODEL is missing: a class name, or a .mo file; --list lists the models of a library."
         )
+    if ssp:
+        from thsa_cosim.scenario.archive import write_system
+
+        click.echo(str(write_system(Path(model), output)))
+        return
     chosen = None if platforms is None else [part.strip() for part in platforms.split(",") if part.strip()]
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")

@@ -36,13 +36,14 @@ import pandas as pd
 
 from thsa_cosim.batch import Job, LocalRunner
 from thsa_cosim.costs import TermsReducer
-from thsa_cosim.identify import Progress, identify
+from thsa_cosim.identify import identify
 from thsa_cosim.identify.problem import build_point
 from thsa_cosim.laws import published_law
 from thsa_cosim.parameters import ParameterSpace
-from thsa_cosim.scenario import Scenario, load_scenario
+from thsa_cosim.scenario import Executor, Scenario, load_scenario
 from thsa_cosim.search import EvolutionSettings
 from thsa_cosim.search.differential_evolution import initial_population
+from thsa_cosim.study import Place, Progress
 
 PINNED = ("aixcalibuha==1.2.0", "ebcpy==0.8.0", "fmpy==0.3.32", "scipy==1.17.1", "pandas==2.3.3")
 HERE = Path(__file__).resolve().parent
@@ -119,7 +120,7 @@ def run_ours(recording: Path, workers: int, *, linear: bool) -> Trail:
 
     with tempfile.TemporaryDirectory() as folder:
         scenario = scenario_of(recording, linear=linear)
-        result = identify(scenario, folder=Path(folder) / "study", workers=workers, on_progress=note)
+        result = identify(scenario, Place(Path(folder) / "study", Executor(workers), note))
     total = time.perf_counter() - begin
     found = result.points[0].parameters
     return Trail(

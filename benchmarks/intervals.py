@@ -26,7 +26,8 @@ from reference.rig import LAWS, Widths, rig_at
 from reference.waves import Wave
 
 from thsa_cosim.identify import identify
-from thsa_cosim.scenario import load_scenario
+from thsa_cosim.scenario import Executor, load_scenario
+from thsa_cosim.study import Place
 
 WIDTHS = Widths(motor=3e-3, gearbox=1e-4, nut=1e-7)
 FOUND = {"motor": ("R_s", "psi_pm", "T_fm", "b_m"), "screw": ("F_fn", "b_n"), "gearbox": ("T_fg", "b_g")}
@@ -104,7 +105,9 @@ def run(
             scenario = load_scenario(REPO / "scenarios" / f"{bench}.toml", fit=[path], seed=seed)
             # The polish ends in the same minimum from a shorter search.
             short = replace(scenario.search, population=12, generations=5)
-            result = identify(replace(scenario, search=short), folder=Path(folder) / "study", workers=workers)
+            result = identify(
+                replace(scenario, search=short), Place(Path(folder) / "study", Executor(workers))
+            )
         found = result.points[0].parameters
         for name in FOUND[bench]:
             stderr = found[name].stderr

@@ -9,7 +9,7 @@ import numpy as np
 from thsa_cosim.batch import Journal, JournalRow, Status
 from thsa_cosim.report.signal_files import write_signals
 from thsa_cosim.signals import Signals
-from thsa_cosim.study import open_study
+from thsa_cosim.study import claim_folder
 
 COMMAND = "thsa-cosim identify bench.toml -o studies/bench"
 POPULATION, GENERATIONS = 6, 3
@@ -152,7 +152,7 @@ def write_identify(folder: Path, **names: str) -> dict[str, Any]:
     """A finished identification; keyword arguments as of ``identify_result``."""
     result = identify_result(**names)
     labels = [p["label"] for p in result["points"]]
-    open_study(folder, identity("identify"), about(samples=dict.fromkeys(labels, 4000)))
+    claim_folder(folder, identity("identify"), about(samples=dict.fromkeys(labels, 4000)))
     (folder / "result.json").write_text(json.dumps(result))
     (channel,) = result["error"]["fit"]
     write_journal(folder, labels, list(result["points"][0]["parameters"]), [channel], GENERATIONS + 1)
@@ -236,7 +236,7 @@ def tune_result() -> dict[str, Any]:
 def write_tune(folder: Path) -> dict[str, Any]:
     """A finished tuning."""
     result = tune_result()
-    open_study(folder, identity("tune"), about(parameters=result["units"]))
+    claim_folder(folder, identity("tune"), about(parameters=result["units"]))
     (folder / "result.json").write_text(json.dumps(result))
     write_journal(folder, ["all conditions"], ["K_p", "K_i"], ["tracking", "effort"], GENERATIONS + 1)
     time = np.arange(1200) * 1e-3
@@ -338,7 +338,7 @@ def diagnose_result() -> dict[str, Any]:
 def write_diagnose(folder: Path) -> dict[str, Any]:
     """A finished diagnosis."""
     result = diagnose_result()
-    open_study(folder, identity("diagnose"), about())
+    claim_folder(folder, identity("diagnose"), about())
     (folder / "result.json").write_text(json.dumps(result))
     time = np.arange(3000) * 1e-3
     true = 9e-3 * np.sin(2.0 * np.pi * time)

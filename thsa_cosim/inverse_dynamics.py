@@ -15,7 +15,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
 
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -57,6 +56,8 @@ def low_pass(values: FloatArray, cutoff: float, step: float, order: int = 4) -> 
 
     The ends are extended oddly by three times the order, as MATLAB's ``filtfilt`` does.
     """
+    from scipy import signal  # half a second to import, and few studies filter
+
     numerator, denominator = signal.butter(order, 2.0 * cutoff * step)
     return _zero_phase(numerator, denominator, values)
 
@@ -77,6 +78,8 @@ def decimate(values: FloatArray, factor: int) -> FloatArray:
     """Every ``factor``-th of values (n,) after a zero-phase filter; the last sample is kept, as MATLAB does."""
     if factor == 1:
         return values
+    from scipy import signal  # half a second to import, and few studies filter
+
     edge = _DECIMATION_EDGE / factor
     filtered = _zero_phase(*signal.cheby1(_DECIMATION_ORDER, _DECIMATION_RIPPLE_DB, edge), values)
     return filtered[(values.size - 1) % factor :: factor]
@@ -183,5 +186,7 @@ def repeatability(values: FloatArray, period: int) -> float:
 
 
 def _zero_phase(numerator: FloatArray, denominator: FloatArray, values: FloatArray) -> FloatArray:
+    from scipy import signal  # half a second to import, and few studies filter
+
     reach = 3 * (max(len(numerator), len(denominator)) - 1)
     return np.asarray(signal.filtfilt(numerator, denominator, values, padlen=min(reach, values.size - 1)))

@@ -4,8 +4,8 @@ import csv
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +17,11 @@ from thsa_cosim.costs import nrmse, rmse
 from thsa_cosim.errors import ScenarioError, StudyError
 from thsa_cosim.inspection import Residual, Trust, judge
 from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario import Scenario, open_runner
+from thsa_cosim.scenario import Scenario
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.study import Place, Study, describe, study_identity
 
 RESULT = "result.json"
-
-OnRecording = Callable[[int, int], None]
-"""Called with (simulated, all) recordings after each one."""
 
 
 @dataclass(frozen=True)
@@ -111,15 +109,8 @@ class SimulateResult:
         }
 
 
-def simulate(
-    scenario: Scenario,
-    *,
-    folder: Path,
-    workers: int = 1,
-    cluster: str | None = None,
-    on_recording: OnRecording | None = None,
-) -> SimulateResult:
-    """Run every recording of ``scenario`` once; write result.json and one CSV per recording to ``folder``.
+def simulate(scenario: Scenario, place: Place) -> SimulateResult:
+    """Run every recording of ``scenario`` once; write result.json and one CSV per recording to the study folder.
 
     Parameters that the scenario would identify take their start values (without: the middle of their bounds).
     A recording whose simulation fails is part of the result, with its reason.
@@ -127,7 +118,7 @@ def simulate(
     Raises
     ------
     InputError
-        If the scenario and its recordings do not fit together.
+        If the scenario and its recordings do not fit together, or the folder holds another study.
     StudyError
         If every simulation failed.
     """
@@ -137,14 +128,28 @@ def simulate(
     def count(_index: int, _outcome: Outcome) -> None:
         nonlocal done
         done += 1
-        if on_recording is not None:
-            on_recording(done, len(cases))
+        place.say(f"{done} of {len(cases)} recordings simulated")
 
     experiments = [experiment for *_, experiment in cases]
-    useful = min(workers, max(len(experiments), 1))
-    with open_runner(scenario.simulation, experiments, useful, cluster) as runner:
-        outcomes = runner.run([Job(e.name) for *_, e in cases], count)
-        notes = (*scenario.notes, *runner.notes)
+    useful = min(place.executor.workers, max(len(experiments), 1))
+    place = replace(place, executor=replace(place.executor, workers=useful))
+    with Study.open(place, study_identity(scenario, "simulate"), describe(scenario)) as study:
+        with study.open_runner(scenario.simulation, experiments) as runner:
+            outcomes = runner.run([Job(e.name) for *_, e in cases], count)
+            notes = (*scenario.notes, *runner.notes)
+        result = _written(place.folder, scenario, cases, outcomes, notes)
+        study.complete()
+    return result
+
+
+def _written(
+    folder: Path,
+    scenario: Scenario,
+    cases: Sequence[tuple[Recording, str, Experiment]],
+    outcomes: Sequence[Outcome],
+    notes: tuple[str, ...],
+) -> SimulateResult:
+    """Compare, and write what was found; StudyError if every simulation failed."""
     results = tuple(
         _compare(scenario, recording, role, outcome)
         for (recording, role, _), outcome in zip(cases, outcomes, strict=True)
@@ -153,7 +158,6 @@ def simulate(
     if failures and failures.total() == len(results):
         reason, number = failures.most_common(1)[0]
         raise StudyError(f"All {len(results)} simulations failed, {number} of them because {reason}.")
-    folder.mkdir(parents=True, exist_ok=True)
     files = [_write_csv(folder, r) for r in results if r.simulated is not None]
     result = SimulateResult(scenario, results, failures, (folder / RESULT, *files), notes)
     partial = folder / f"{RESULT}.part"

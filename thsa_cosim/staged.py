@@ -1,20 +1,19 @@
 """Several scenarios in order, each with what the earlier ones found: the benches, then the whole actuator."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from thsa_cosim.errors import InputError, StudyError
-from thsa_cosim.identify import IdentifyResult, PointResult, Progress, identify
+from thsa_cosim.identify import IdentifyResult, PointResult, identify
 from thsa_cosim.identify.over_temperature import values_at
 from thsa_cosim.identify.parameter_set import parameter_set
 from thsa_cosim.identify.problem import Given
 from thsa_cosim.scenario import Scenario, Stage, StagedScenario, hand_on
 from thsa_cosim.simulate import SimulateResult, simulate
 from thsa_cosim.ssv import ParameterSet
-from thsa_cosim.study import open_study, stages_identity, study_identity
+from thsa_cosim.study import Place, claim_folder, stages_identity
 from thsa_cosim.units import conversion
 
 
@@ -58,31 +57,21 @@ class _Finished:
         return None
 
 
-def run_stages(
-    staged: StagedScenario,
-    *,
-    folder: Path,
-    workers: int = 1,
-    cluster: str | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
-    command: str = "",
-) -> StagedResult:
-    """Run all stages, each in a folder of its own below ``folder``; a folder that exists is continued.
-
-    ``command``: the command line that repeats the study, to be kept with it.
+def run_stages(staged: StagedScenario, place: Place) -> StagedResult:
+    """Run all stages, each in a folder of its own below that of ``place``; a folder that exists is continued.
 
     Raises
     ------
     InputError, StudyError
         As the stages' own runs, and StudyError if a stage lacks a value that a later one needs.
     """
-    open_study(
-        folder,
+    claim_folder(
+        place.folder,
         stages_identity(staged),
         {
             "title": staged.title or staged.path.stem,
             "scenario": str(staged.path),
-            "command": command,
+            "command": place.command,
             "stages": [stage.name for stage in staged.stages],
         },
     )
@@ -93,18 +82,14 @@ def run_stages(
         scenario = stage.scenario
         for earlier in finished:
             scenario = hand_on(earlier.stage, earlier.found, scenario)
-        place = folder / f"{number}_{stage.name}"
-        if scenario.kind == "simulate":
-            open_study(place, study_identity(scenario))
-            simulated[stage.name] = simulate(scenario, folder=place, workers=workers, cluster=cluster)
-            continue
         label = f"stage {number} of {len(staged.stages)}, {stage.name}"
+        own = place.stage(f"{number}_{stage.name}", label)
+        if scenario.kind == "simulate":
+            simulated[stage.name] = simulate(scenario, own)
+            continue
         result = identify(
             scenario,
-            folder=place,
-            workers=workers,
-            cluster=cluster,
-            on_progress=_labelled(on_progress, label),
+            own,
             given={
                 p.temperature_degC: _given(finished, scenario, p.temperature_degC) for p in scenario.points
             },
@@ -122,14 +107,6 @@ def run_stages(
         parameter_set=parameters,
         notes=tuple(notes),
     )
-
-
-def _labelled(
-    on_progress: Callable[[Progress], None] | None, label: str
-) -> Callable[[Progress], None] | None:
-    if on_progress is None:
-        return None
-    return lambda progress: on_progress(replace(progress, stage=label))
 
 
 def _given(finished: list[_Finished], target: Scenario, temperature: float | None) -> Given:

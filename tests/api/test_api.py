@@ -3,12 +3,14 @@
 import json
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
+from small_scenario import toml
 
 import thsa_cosim as tc
 from thsa_cosim.errors import InputError, ScenarioError
@@ -134,8 +136,30 @@ def test_simulate_compares(tmp_path: Path) -> None:
     assert study.plots == ("driven_p25_b",)
 
 
+def test_a_scenario_may_be_a_dict(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its paths are relative to where one is; paths, tuples and arrays may stand in it."""
+    monkeypatch.chdir(tmp_path)
+    scenario = {
+        "title": "Screw at 25 degC",
+        "fmu": ROOT / "fmus" / "Screw.fmu",
+        "recordings": tomllib.loads((SCENARIOS / "screw.toml").read_text())["recordings"]
+        | {"fit": (SCENARIOS / "recordings" / "screw_p25.parquet",)},
+    }
+    study = tc.simulate(scenario, workers=1, quiet=True)
+    assert study.title == "Screw at 25 degC"
+    assert study.folder.parent == Path("studies")
+    assert study.folder.name.startswith("screw-at-25-degc")
+    file = tmp_path / "screw.toml"
+    scenario |= {"kind": "simulate", "fmu": str(scenario["fmu"])}
+    scenario["recordings"] |= {"fit": [str(name) for name in scenario["recordings"]["fit"]]}
+    file.write_text(toml(scenario))
+    pd.testing.assert_frame_equal(tc.simulate(file, workers=1, quiet=True).recordings, study.recordings)
+    with pytest.raises(ScenarioError, match=r"^scenario: unknown key 'titel'"):
+        tc.simulate({**scenario, "titel": "x"})
+
+
 def test_a_scenario_of_another_kind_names_the_right_one(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="kind is 'tune'"):
+    with pytest.raises(ScenarioError, match="of kind 'tune': run 'thsa-cosim tune "):
         tc.identify(SCENARIOS / "table4.toml")
     recording = f'"{SCENARIOS}/recordings/driven_p25_b.parquet"'
     text = (SCENARIOS / "driven_check.toml").read_text()
@@ -143,7 +167,7 @@ def test_a_scenario_of_another_kind_names_the_right_one(tmp_path: Path) -> None:
     path.write_text(
         text.replace('"../fmus/', f'"{ROOT / "fmus"}/').replace('"recordings/driven_*.parquet"', recording)
     )
-    with pytest.raises(ScenarioError, match=r"kind 'simulate': use simulate\("):
+    with pytest.raises(ScenarioError, match=r"of kind .simulate.: run .thsa-cosim simulate "):
         tc.identify(path)
 
 
@@ -202,9 +226,9 @@ def test_names_of_the_package() -> None:
 
 
 def test_functions_stay_functions_when_their_modules_are_imported() -> None:
-    from thsa_cosim.identify import Progress
+    from thsa_cosim.identify import Estimate
 
-    assert sys.modules["thsa_cosim.identify"].Progress is Progress
+    assert sys.modules["thsa_cosim.identify"].Estimate is Estimate
     assert tc.identify.__module__ == "thsa_cosim.api.run"
 
 

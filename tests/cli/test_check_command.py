@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
+from fmu_sources import build
 
 from thsa_cosim.cli import run_command
 
@@ -18,7 +19,12 @@ def test_a_recording_is_checked_by_its_ending(capsys: pytest.CaptureFixture[str]
 
 
 @pytest.mark.parametrize(
-    ("name", "kind"), [("motor", "identify"), ("table4", "tune"), ("actuator", "identify")]
+    ("name", "kind"),
+    [
+        pytest.param("motor", "identify", marks=pytest.mark.slow),
+        ("table4", "tune"),
+        pytest.param("actuator", "identify", marks=pytest.mark.slow),
+    ],
 )
 def test_a_scenario_is_checked_by_its_ending(
     name: str, kind: str, capsys: pytest.CaptureFixture[str]
@@ -27,6 +33,23 @@ def test_a_scenario_is_checked_by_its_ending(
     report = json.loads(capsys.readouterr().out)
     assert (report["kind"], report["scenario"]["kind"]) == ("scenario", kind)
     assert report["data"]["verdict"] in ("good", "usable", "bad")
+    lines = {line["name"]: line for line in report["fmu"]["findings"]}
+    assert "the given inputs" in lines["runs"]["text"]
+    assert lines["start values"]["text"].startswith("each of")
+
+
+def test_options_of_an_fmu_and_the_exit_code_of_a_failed_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--duration", "0.5", "--step", "0.005", "--start", "tau=0.2", "--input", "u=3"]
+    assert run_command(["check", str(build.lag2()), "--json", *options]) == 0
+    report = json.loads(capsys.readouterr().out)
+    runs = next(line for line in report["findings"] if line["name"] == "runs")
+    assert "0.5 s in 100 steps" in runs["text"]
+    assert run_command(["check", str(build.lag2("CRASH_INSTANTIATE")), "--json"]) == 3
+    assert json.loads(capsys.readouterr().out)["verdict"] == "failed"
+    assert run_command(["check", str(build.lag2()), "--start", "tau"]) == 2
+    assert "no NAME=VALUE" in capsys.readouterr().err
 
 
 def test_what_is_not_there_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -96,7 +96,7 @@ def test_a_tuning_counts_conditions_and_the_map(tmp_path: Path, capsys: pytest.C
 class FailingRunner:
     """A runner of an FMU that never succeeds."""
 
-    def __init__(self, *_: object) -> None:
+    def __init__(self, *_: object, **limits: object) -> None:
         pass
 
     def run(self, jobs: Sequence[Job]) -> list[Outcome]:
@@ -112,7 +112,7 @@ class FailingRunner:
 def test_failing_runs_are_told_beforehand(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("thsa_cosim.api.forecast.open_runner", FailingRunner)
+    monkeypatch.setattr("thsa_cosim.scenario.executor.LocalRunner", FailingRunner)
     scenario = small("screw.toml", tmp_path)
     code, out, _ = run(capsys, "identify", scenario, "-o", tmp_path / "study", "--dry-run")
     assert code == 0

@@ -5,6 +5,7 @@
  * SHARED         a static counter leaks from one instance into the next
  * PER_PROCESS    the result depends on the process
  * LEAKS          an instance leaves 64 KiB behind
+ * AT_REST        x(0) = 0: nothing moves
  * HANDLES        an instance leaves a file open
  */
 #include <fcntl.h>
@@ -27,6 +28,9 @@ static char* volatile behind; /* else the compiler drops the allocation */
 
 static double start_value(void) {
     double x = 1.0;
+#ifdef AT_REST
+    x = 0.0;
+#endif
 #ifdef SHARED
     x += 1e-3 * instances++;
 #endif

@@ -11,7 +11,7 @@ import report_studies as studies
 
 from thsa_cosim.batch import Journal
 from thsa_cosim.report.page import write_page
-from thsa_cosim.study import open_study
+from thsa_cosim.study import claim_folder
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = (
@@ -43,7 +43,9 @@ def show(browser: Any) -> Iterator[Show]:
     contexts = []
 
     def opened(path: Path, **options: Any) -> Any:
-        context = browser.new_context(viewport={"width": 1280, "height": 900}, offline=True, **options)
+        context = browser.new_context(
+            **{"viewport": {"width": 1280, "height": 900}, "offline": True, **options}
+        )
         contexts.append(context)
         page = context.new_page()
         page.troubles = []
@@ -119,13 +121,17 @@ def test_summary_comes_first_and_says_what_came_out_and_how_sure_it_is(identifie
     sections = [s.get_attribute("id") for s in identified.query_selector_all("section")]
     assert sections[0] == "summary"
     text = identified.inner_text("#summary")
-    assert "Find R_s and T_fm of Motor.fmu at 2 temperatures (−30 °C to 25 °C) from 2 recordings" in text
+    assert text.split("\n")[2].startswith(
+        "Found R_s and T_fm, 1 value of them not determined by the data, but the model"
+    )
+    details = identified.inner_text("#details")
+    assert "Find R_s and T_fm of Motor.fmu at 2 temperatures (−30 °C to 25 °C) from 2 recordings" in details
     assert "0.5000 ± 0.0050" in text
     assert "1.900 ± 0.019" in text
-    assert "1 of 4 values are not determined by the data: T_fm at −30 °C" in text
+    assert "1 of 4 values are not determined by the data: T_fm at −30 °C" in details
     assert "6.0" in text or "6 ×" in text  # rmse 0.3 A against 0.05 A
-    assert "the model lacks something" in text
-    assert "48 evaluations, 6 failed." in text
+    assert "the model lacks something" in details
+    assert "48 evaluations, 6 failed." in details
 
 
 def test_every_plot_is_drawn_with_units_on_its_axes_and_nothing_complains(
@@ -179,16 +185,17 @@ def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(diag
     page = diagnosed
     summary = page.inner_text("#summary")
     assert "The model lacks backlash (Backlash of the screw): added to it, the error on held-out" in summary
-    assert "Find out which physical effect THSA.fmu lacks" in summary
+    details = page.inner_text("#details")
+    assert "Find out which physical effect THSA.fmu lacks" in details
     assert "THSA_with_backlash.mo, THSA_with_backlash.fmu" in summary
     assert "fmus/THSA.fmu, SHA-256 aaaa" in page.inner_text("#provenance")
     assert "(2.50 ± 0.10)e-4" in summary
     assert "These recordings cannot tell backlash from velocity-sensor-delay." in summary
     assert (
-        "Record slow reversals under no load (experiment.csv): it sets backlash and velocity-sensor-delay 812"
-        in summary
+        "Record slow reversals under no load (experiment.csv): there backlash and velocity-sensor-delay differ by 812"
+        " variances of the noise" in summary
     )
-    assert "largest error falls from 5 × the sensor's noise to 1.05 × noise" in summary
+    assert "largest error falls from 5 × the sensor's noise to 1.05 × noise" in details
     assert "2 % of the repeatable residual is left in the worst signal." in summary
     errors = table_of(page, "Errors before and after")
     assert cells(errors, "after / noise") == ["1.05", "1.05"]
@@ -208,6 +215,7 @@ def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(diag
         "winding-self-heating"
     ]
     assert set(found) == {
+        "evidence",
         "balance",
         "ratios",
         "dependence",
@@ -261,7 +269,7 @@ def test_click_on_a_heading_sorts_by_number_and_again_the_other_way(tuned: Any, 
 def test_tuning_shows_gains_requirements_line_and_what_was_broken_before(tuned: Any) -> None:
     text = tuned.inner_text("#summary")
     assert "Found: K_p = 0.4 A/(rad/s) and K_i = 3 A/rad; 2 of 2 requirements are met." in text
-    assert "Note: K_i ends at its upper bound" in text
+    assert "Note: K_i ends at its upper bound" in tuned.inner_text("#details")
     assert "K_p/K_i = 0.125 (middle half 0.11 to 0.14); published: 0.1218." in tuned.inner_text("#plane")
     table = table_of(tuned, "Before and after")
     row = next(r for r in table.query_selector_all("tbody tr") if r.inner_text().startswith("overshoot"))
@@ -372,9 +380,59 @@ def test_printing_opens_folds_and_leaves_the_page_as_it_was(show: Show, tmp_path
     assert page.query_selector(".main-svg").bounding_box()["width"] > 1000
 
 
+#: Boxes of the visible texts of a plot that overlap, as pairs of texts; a pixel of touching is none.
+OVERLAPS = """plot => {
+  const texts = [...plot.querySelectorAll('.infolayer text, .xtick text, .ytick text')]
+    .filter(t => t.textContent.trim() && !t.closest('.hoverlayer') && t.getBoundingClientRect().width > 0);
+  const boxes = texts.map(t => [t.textContent, t.getBoundingClientRect()]);
+  const found = [];
+  for (let i = 0; i < boxes.length; i++) for (let k = i + 1; k < boxes.length; k++) {
+    const [a, b] = [boxes[i][1], boxes[k][1]];
+    const wide = Math.min(a.right, b.right) - Math.max(a.left, b.left);
+    const high = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+    if (wide > 2 && high > 3) found.push([boxes[i][0], boxes[k][0]]);
+  }
+  return found;
+}"""
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("kind", ["identify", "tune", "diagnose"])
+def test_nothing_overlaps_and_nothing_is_wider_than_the_screen(
+    show: Show, tmp_path: Path, kind: str, width: int
+) -> None:
+    getattr(studies, f"write_{kind}")(tmp_path / "study")
+    page = show(write_page(tmp_path / "study"), viewport={"width": width, "height": 900})
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for name, plot in plots(page).items():
+        assert plot.evaluate(OVERLAPS) == [], name
+        inside = plot.evaluate("p => p.querySelector('.main-svg').getBoundingClientRect().right")
+        assert inside <= width, name
+    assert page.troubles == []
+
+
+def test_first_screen_of_a_diagnosis_argues(diagnosed: Any) -> None:
+    blocks = diagnosed.eval_on_selector_all("#summary > *", "all => all.map(e => e.className || e.tagName)")
+    assert blocks[:3] == ["H2", "lead bad", "FIGURE"]
+    assert diagnosed.query_selector("#summary .plot").get_attribute("id") == "evidence"
+    text = diagnosed.inner_text("#summary")
+    assert "Errors before → after, as multiples of the noise" in text
+    assert "Use the extended model" in text
+
+
+def test_cursor_tells_values_with_units(identified: Any) -> None:
+    plot = plots(identified)["fit-run_25"]
+    layout = plot.evaluate("p => [p._fullLayout.hovermode, p._fullLayout.xaxis.unifiedhovertitle.text]")
+    assert layout == ["x unified", "time %{x:.5g} s"]
+    assert plot.evaluate("p => new Set(p.data.map(t => t.xaxis)).size") == 1
+    assert set(plot.evaluate("p => p.data.map(t => t.hovertemplate)")) == {"%{y:.5g} A"}
+    laws = plots(identified)["laws"].evaluate("p => p.data.map(t => t.hovertemplate || '')")
+    assert any("temperature %{x:.5g} °C<br>identified %{y:.5g} ± %{customdata:.2g} ohm" in t for t in laws)
+
+
 def test_running_study_shows_how_far_it_is(show: Show, tmp_path: Path) -> None:
     labels = ["-30 degC", "25 degC"]
-    open_study(
+    claim_folder(
         tmp_path,
         studies.identity("identify"),
         studies.about(parameters={"R_s": "ohm"}, samples=dict.fromkeys(labels, 10)),

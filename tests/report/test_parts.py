@@ -27,7 +27,7 @@ from thsa_cosim.report.parts.text import degrees, listing, plus_minus
 from thsa_cosim.report.signal_files import read_signals, signal_units, write_signals
 from thsa_cosim.search import EvolutionSettings, evolve
 from thsa_cosim.signals import Signals
-from thsa_cosim.study import open_study
+from thsa_cosim.study import claim_folder
 
 ROOT = Path(__file__).parents[2]
 LOCAL_FIRST, EVOLUTION = 'method = "local-first"', 'method = "differential-evolution"'
@@ -274,12 +274,12 @@ def test_page_that_cannot_be_written_is_one_sentence(
 
 
 def test_study_in_stages_that_runs_shows_the_stages_that_have_begun(tmp_path: Path) -> None:
-    open_study(
+    claim_folder(
         tmp_path, studies.identity("identify in stages"), studies.about(stages=["motor", "screw", "check"])
     )
     for number, name in enumerate(("motor", "screw"), start=1):
         place = tmp_path / f"{number}_{name}"
-        open_study(place, studies.identity("identify"), studies.about(title=f"{name} bench"))
+        claim_folder(place, studies.identity("identify"), studies.about(title=f"{name} bench"))
         studies.write_journal(place, ["-30 degC"], ["R_s"], ["i_q"], generations=number)
     found = read_study(tmp_path)
     assert found.status == "stopped"  # no process writes a journal
@@ -293,7 +293,7 @@ def test_study_in_stages_that_runs_shows_the_stages_that_have_begun(tmp_path: Pa
 
 
 def test_fresh_study_without_a_single_vector_has_a_page(tmp_path: Path) -> None:
-    open_study(tmp_path, studies.identity("identify"), studies.about())
+    claim_folder(tmp_path, studies.identity("identify"), studies.about())
     text = write_page(tmp_path).read_text()
     assert "its folder does not tell whether it is running" in text
     with Journal.open(tmp_path / "journal.csv", ["R_s"], ["i_q"]):

@@ -12,6 +12,7 @@ from thsa_cosim.identify.problem import build_point
 from thsa_cosim.scenario import Scenario, load_scenario
 from thsa_cosim.signals import Signals
 from thsa_cosim.simulate import simulate
+from thsa_cosim.study import Place
 
 EMPS = Path(__file__).parents[2] / "fmus" / "EMPS.fmu"
 PARTS = [
@@ -134,7 +135,7 @@ def test_a_drive_that_is_cut_in_motion_needs_its_lead_in(tmp_path):
             },
         }
         (tmp_path / "later.toml").write_text(toml(data))
-        result = simulate(load_scenario(tmp_path / "later.toml"), folder=tmp_path / f"study_{lead_in}")
+        result = simulate(load_scenario(tmp_path / "later.toml"), Place(tmp_path / f"study_{lead_in}"))
         return result.recordings[0].errors["F"].rmse
 
     assert error(0.0) > 5.0  # N

@@ -17,7 +17,7 @@ from small_scenario import toml, valid, write_folder
 from thsa_cosim.diagnosis.catalogue.known import choose, known_effects
 from thsa_cosim.errors import InputError
 from thsa_cosim.export.flatten import locate
-from thsa_cosim.scenario import load_study, load_tune
+from thsa_cosim.scenario import load as load_any
 from thsa_cosim.units import is_unit, same_dimension
 
 ROOT = Path(__file__).parents[2]
@@ -160,9 +160,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def load(path: Path, kind: str) -> object:
-    if kind == "tune":
-        return load_tune(path)
-    scenario = load_study(path)
+    scenario = load_any(path)
     spec = getattr(scenario, "diagnose", None)
     if spec is not None:  # what the diagnosis itself looks up, before it runs anything
         choose(known_effects(spec.catalogue), spec.effects, "diagnose.effects")

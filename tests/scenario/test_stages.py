@@ -4,7 +4,8 @@ import pytest
 from small_scenario import set_in, toml, valid, write_folder
 
 from thsa_cosim.errors import RecordingError, ScenarioError, ThsaCosimError
-from thsa_cosim.scenario import Scenario, StagedScenario, hand_on, load_study
+from thsa_cosim.scenario import Scenario, StagedScenario, hand_on
+from thsa_cosim.scenario import load as load_any
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,7 @@ STAGES = {
 
 def load(folder, data, **options):
     (folder / "all.toml").write_text(toml(data))
-    return load_study(folder / "all.toml", **options)
+    return load_any(folder / "all.toml", **options)
 
 
 def test_stages_are_read_in_order_and_share_the_seed(folder):
@@ -48,7 +49,7 @@ def test_stages_are_read_in_order_and_share_the_seed(folder):
     ]
     assert {s.scenario.seed for s in study.stages} == {5}
     assert {s.scenario.seed for s in load(folder, STAGES, seed=8).stages} == {8}
-    assert isinstance(load_study(folder / "first.toml"), Scenario)
+    assert isinstance(load_any(folder / "first.toml"), Scenario)
 
 
 def test_what_a_stage_found_is_handed_on_in_the_units_of_the_next_fmu(folder):

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from thsa_cosim.errors import InputError
-from thsa_cosim.study import MARKER, open_study
+from thsa_cosim.study import MARKER, claim_folder
 
 ASKED = {"kind": "identify", "cost.error": "squared", "fmu": "a" * 64, "seed": 1}
 
@@ -24,24 +24,24 @@ ASKED = {"kind": "identify", "cost.error": "squared", "fmu": "a" * 64, "seed": 1
     ],
 )
 def test_one_sentence_names_the_key_and_both_values(tmp_path: Path, key: str, value: Any, words: str) -> None:
-    assert open_study(tmp_path / "study", ASKED) is False
-    assert open_study(tmp_path / "study", ASKED) is True
+    assert claim_folder(tmp_path / "study", ASKED) is False
+    assert claim_folder(tmp_path / "study", ASKED) is True
     with pytest.raises(InputError) as caught:
-        open_study(tmp_path / "study", {**ASKED, key: value})
+        claim_folder(tmp_path / "study", {**ASKED, key: value})
     assert words in str(caught.value)
     assert str(caught.value).endswith(": choose another folder with -o, or change it back.")
-    assert open_study(tmp_path / "study", ASKED) is True
+    assert claim_folder(tmp_path / "study", ASKED) is True
 
 
 def test_several_changes_name_what_was_asked_before_what_follows_from_it(tmp_path: Path) -> None:
-    open_study(tmp_path / "study", {**ASKED, "start values.a": 1.0, "parameters (order)": ["a", "b"]})
+    claim_folder(tmp_path / "study", {**ASKED, "start values.a": 1.0, "parameters (order)": ["a", "b"]})
     with pytest.raises(InputError, match=r"with seed = 1; this one has seed = 2 \(and 2 more\)"):
-        open_study(tmp_path / "study", {**ASKED, "seed": 2})
+        claim_folder(tmp_path / "study", {**ASKED, "seed": 2})
 
 
 def test_the_title_is_shown_as_it_now_is(tmp_path: Path) -> None:
-    open_study(tmp_path / "study", ASKED, {"title": "old", "command": "a"})
-    open_study(tmp_path / "study", ASKED, {"title": "new"})
+    claim_folder(tmp_path / "study", ASKED, {"title": "old", "command": "a"})
+    claim_folder(tmp_path / "study", ASKED, {"title": "new"})
     about = json.loads((tmp_path / "study" / MARKER).read_text())["about"]
     assert (about["title"], about["command"]) == ("new", "a")
     assert "started" in about
@@ -50,22 +50,22 @@ def test_the_title_is_shown_as_it_now_is(tmp_path: Path) -> None:
 def test_a_folder_of_an_older_version_is_refused(tmp_path: Path) -> None:
     (tmp_path / MARKER).write_text('{"kind": "identify", "scenario": "0", "about": {}}')
     with pytest.raises(InputError, match="of an older version"):
-        open_study(tmp_path, ASKED)
+        claim_folder(tmp_path, ASKED)
 
 
 def test_a_folder_that_is_no_study_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(InputError, match="exists and is no study folder"):
-        open_study(tmp_path, ASKED)
+        claim_folder(tmp_path, ASKED)
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
     with pytest.raises(InputError, match="is no study folder"):
-        open_study(tmp_path / "thesis.tex", ASKED)
+        claim_folder(tmp_path / "thesis.tex", ASKED)
     with pytest.raises(InputError, match="cannot be used"):
-        open_study(tmp_path / "thesis.tex" / "below", ASKED)
+        claim_folder(tmp_path / "thesis.tex" / "below", ASKED)
 
 
 @pytest.mark.parametrize("content", ["", "[1]", "{"])
 def test_a_damaged_marker_is_named(tmp_path: Path, content: str) -> None:
     (tmp_path / MARKER).write_text(content)
     with pytest.raises(InputError, match=r"study\.json is damaged"):
-        open_study(tmp_path, ASKED)
+        claim_folder(tmp_path, ASKED)

@@ -10,7 +10,8 @@ from typing import Annotated, Any, Union, get_args, get_origin
 import pytest
 from small_scenario import toml, valid, write_folder
 
-from thsa_cosim.scenario import KINDS, Table, load_scenario, load_study, load_tune
+from thsa_cosim.scenario import KINDS, Table, load_scenario
+from thsa_cosim.scenario import load as load_any
 from thsa_cosim.scenario.schema import StagesTable
 from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.ssv import ParameterSet, write_ssv
@@ -118,7 +119,7 @@ def folder(tmp_path: Path) -> Path:
 def load(folder: Path, data: dict[str, Any]) -> Any:
     file = folder / "small.toml"
     file.write_text(toml(data))
-    return (load_tune if data["kind"] == "tune" else load_scenario)(file)
+    return load_any(file)
 
 
 def diagnosis() -> dict[str, Any]:
@@ -175,12 +176,12 @@ def test_stages_count_with_all_that_they_ask(folder: Path) -> None:
     (folder / "one.toml").write_text(toml(valid()))
     stages = folder / "stages.toml"
     stages.write_text(toml({"kind": "identify", "stages": [{"scenario": "one.toml"}]}))
-    before = stages_identity(load_study(stages))  # type: ignore[arg-type]
+    before = stages_identity(load_any(stages))  # type: ignore[arg-type]
     data = valid()
     data["parameters"][0]["upper"] = 6.0
     (folder / "one.toml").write_text(toml(data))
-    after = stages_identity(load_study(stages))  # type: ignore[arg-type]
+    after = stages_identity(load_any(stages))  # type: ignore[arg-type]
     assert changed(before, after) == ["stages[one].parameters[R_s].upper"]
     stages.write_text(toml({"kind": "identify", "stages": [{"scenario": "one.toml", "give": ["J"]}]}))
-    again = stages_identity(load_study(stages))  # type: ignore[arg-type]
+    again = stages_identity(load_any(stages))  # type: ignore[arg-type]
     assert changed(after, again) == ["stages[one].give"]

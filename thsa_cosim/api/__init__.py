@@ -1,6 +1,7 @@
 """For notebooks and scripts: run a scenario or open a study folder, get tables (pandas) and figures (matplotlib).
 
 ``run``      identify, tune, diagnose, simulate: a scenario in, a study out
+``conduct``  the table of kinds, and how a study of any of them is conducted (the command line does it so, too)
 ``study``    what every study folder says; ``kinds``: what each kind says besides
 ``several``  the studies of a folder, and what differs between some of them
 
@@ -8,8 +9,9 @@
 that one that was run elsewhere opens as one that has just been run.
 """
 
+from thsa_cosim.api.conduct import cores, default_folder
 from thsa_cosim.api.kinds import DiagnoseStudy, IdentifyStudy, SimulateStudy, TuneStudy, open_study
-from thsa_cosim.api.run import cores, default_folder, diagnose, identify, simulate, tune
+from thsa_cosim.api.run import diagnose, identify, simulate, tune
 from thsa_cosim.api.several import compare, list_studies
 from thsa_cosim.api.study import Study
 

@@ -11,7 +11,7 @@ from thsa_cosim.batch import Experiment, Job, Outcome
 from thsa_cosim.identify.evaluate import planned_vectors
 from thsa_cosim.identify.problem import build_case
 from thsa_cosim.parameters import ParameterSpace
-from thsa_cosim.scenario import Scenario, SimulationSpec, StagedScenario, TuneScenario, open_runner
+from thsa_cosim.scenario import AnyScenario, Executor, Scenario, SimulationSpec, StagedScenario, TuneScenario
 from thsa_cosim.tune.problem import build_groups
 
 SAMPLE = 12
@@ -69,21 +69,19 @@ Ask = tuple[Experiment, ParameterSpace, str]
 """An experiment, what is searched in it, and the recording that its parameters may belong to."""
 
 
-def forecast(
-    study: Scenario | StagedScenario | TuneScenario, *, workers: int = 1, cluster: str | None = None
-) -> tuple[Forecast, ...]:
+def forecast(study: AnyScenario, executor: Executor) -> tuple[Forecast, ...]:
     """Forecast a scenario: one entry, or one per stage of a scenario in stages.
 
     A few runs with random parameters are simulated for it; nothing is written.
     """
     if isinstance(study, StagedScenario):
-        return tuple(_of_recordings(stage.scenario, workers, cluster) for stage in study.stages)
+        return tuple(_of_recordings(stage.scenario, executor) for stage in study.stages)
     if isinstance(study, TuneScenario):
-        return (_of_tuning(study, workers, cluster),)
-    return (_of_recordings(study, workers, cluster),)
+        return (_of_tuning(study, executor),)
+    return (_of_recordings(study, executor),)
 
 
-def _of_recordings(scenario: Scenario, workers: int, cluster: str | None) -> Forecast:
+def _of_recordings(scenario: Scenario, executor: Executor) -> Forecast:
     searches, asks = [], []
     for point in scenario.points if scenario.kind != "simulate" else ():
         cases = [build_case(scenario, recording, point.fixed) for recording in point.fit]
@@ -100,12 +98,12 @@ def _of_recordings(scenario: Scenario, workers: int, cluster: str | None) -> For
         for r in alone
     ]
     title = scenario.title or scenario.path.stem
-    found = _timed(title, searches, len(alone), asks, scenario.simulation, scenario.seed, workers, cluster)
+    found = _timed(title, searches, len(alone), asks, scenario.simulation, scenario.seed, executor)
     locally = bool(searches) and scenario.search.method == "local-first" and scenario.search.polish
     return replace(found, expected=locally)
 
 
-def _of_tuning(scenario: TuneScenario, workers: int, cluster: str | None) -> Forecast:
+def _of_tuning(scenario: TuneScenario, executor: Executor) -> Forecast:
     groups = build_groups(scenario)
     spec, space = scenario.search, scenario.parameters
     searches = [
@@ -123,7 +121,7 @@ def _of_tuning(scenario: TuneScenario, workers: int, cluster: str | None) -> For
     if scenario.schedule is not None:
         also += (1 + sets) * int(np.prod([len(axis.values) for axis in scenario.schedule.check]))
     asks = [(case.experiment, space, "") for case in groups[0].cases]
-    return _timed(scenario.title, searches, also, asks, scenario.simulation, scenario.seed, workers, cluster)
+    return _timed(scenario.title, searches, also, asks, scenario.simulation, scenario.seed, executor)
 
 
 def _timed(
@@ -133,8 +131,7 @@ def _timed(
     asks: Sequence[Ask],
     simulation: SimulationSpec,
     seed: int,
-    workers: int,
-    cluster: str | None,
+    executor: Executor,
 ) -> Forecast:
     chosen = [asks[k] for k in np.unique(np.linspace(0, len(asks) - 1, SAMPLE).astype(int))]
     random = np.random.default_rng(seed)
@@ -147,7 +144,8 @@ def _timed(
             drawn.append(Job(experiment.name, space.assignments(values, recording) if len(space) else {}))
         return drawn
 
-    with open_runner(simulation, [experiment for experiment, *_ in chosen], workers, cluster) as runner:
+    workers = executor.workers
+    with executor.open_runner(simulation, [experiment for experiment, *_ in chosen]) as runner:
         outcomes, seconds = _clock(runner.run, jobs(workers))
         if seconds < LONG_S:
             # The first run of a worker loads the FMU and compiles; the others are what a study is made of.

@@ -159,14 +159,6 @@ class DiagnoseStudy(Study):
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("signal")
 
 
-_KINDS: Mapping[str, type[Study]] = {
-    "identify": IdentifyStudy,
-    "tune": TuneStudy,
-    "simulate": SimulateStudy,
-    "diagnose": DiagnoseStudy,
-}
-
-
 def open_study(folder: Path | str) -> Study:
     """Open the study in ``folder``; its class follows from its kind.
 
@@ -175,10 +167,12 @@ def open_study(folder: Path | str) -> Study:
     InputError
         If the folder holds no result (yet), or one that cannot be read.
     """
+    from thsa_cosim.api.conduct import KINDS
+
     path = Path(folder) / "result.json"
     try:
         result = json.loads(path.read_text(encoding="utf-8"))
-        kind = _KINDS[result["kind"]]
+        kind = KINDS[result["kind"]].study
     except OSError as error:
         raise InputError(
             f"{folder} holds no result of a study ({error.strerror}); run its command first."

@@ -12,10 +12,11 @@ import numpy as np
 
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.local import LocalRunner
-from thsa_cosim.fmu import FmuDescription, read_description
+from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.fmu.inputs import input_modes, input_variables, is_linear
 from thsa_cosim.fmu.plant import Kind
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.system import read_description
 
 REFERENCE_TOLERANCE = 1e-8
 GOOD = 2e-3

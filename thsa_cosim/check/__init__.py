@@ -1,19 +1,21 @@
 """What an FMU can be trusted with: read its description, then try it in worker processes.
 
-``finding``  the lines of the report
-``trials``   how each line comes about
+``finding``   the lines of the report
+``trials``    how each line comes about
+``numerics``  what the numbers of a trial mean
 """
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from thsa_cosim.check.finding import CheckReport, Finding, Verdict
-from thsa_cosim.check.trials import Trials
-from thsa_cosim.fmu import probe
+from thsa_cosim.check.trials import Excitation, Trials
+from thsa_cosim.errors import ParameterError
+from thsa_cosim.fmu import FmuDescription, probe
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.system import read_description
 
-__all__ = ["CheckReport", "Finding", "Verdict", "check_fmu"]
+__all__ = ["CheckReport", "Excitation", "Finding", "Verdict", "check_fmu"]
 
 
 def check_fmu(
@@ -22,6 +24,7 @@ def check_fmu(
     values: Mapping[str, float] | None = None,
     inputs: Signals | None = None,
     time: FloatArray | None = None,
+    excitation: Excitation | None = None,
     deadline_s: float = 30.0,
     cycles: int = 50,
     on_finding: Callable[[Finding], None] | None = None,
@@ -33,8 +36,10 @@ def check_fmu(
     values
         Start values for all trials, by variable name, in the FMU's units.
     inputs, time
-        Input signals and communication points (n,) s; default: the FMU's default experiment with inputs at
-        their start values, or ramping away from them where nothing moves otherwise.
+        Input signals and communication points (n,) s; default: the FMU's default experiment with inputs that run
+        away from their start values, with kinks.
+    excitation
+        All of these and more (duration, step, interface); wins over them.
     deadline_s
         Wall time after which a run is killed, s.
     cycles
@@ -44,14 +49,32 @@ def check_fmu(
 
     Raises
     ------
-    FmuError
-        If the file is no FMU at all. An FMU that crashes, hangs or fails is a line of the report.
+    FmuError, ParameterError
+        If the file is no FMU at all, or lacks a variable that is named. An FMU that crashes, hangs or fails is a
+        line of the report.
     """
     description = read_description(path)
-    trials = Trials(description, dict(values or {}), inputs, time, deadline_s, on_finding)
+    given = excitation or Excitation(dict(values or {}), inputs, time)
+    _check_names(description, given)
+    trials = Trials(description, given, deadline_s, on_finding)
     trials.description_lines()
     if trials.first_run():
+        trials.inputs_lines()
         runs_changed = trials.fresh_lines(cycles)
+        trials.start_value_line()
+        trials.larger_inputs_line()
         trials.reset_lines(cycles, runs_changed)
         trials.exchange_line()
     return CheckReport(description.path, description.sha256, probe.facts(description), tuple(trials.findings))
+
+
+def _check_names(description: FmuDescription, given: Excitation) -> None:
+    for name in given.values:
+        description.variable(name)
+    movable = [v.name for v in probe.excitable(description)]
+    for name in given.ends:
+        if name not in movable:
+            raise ParameterError(
+                f"{description.path}: {description.variable(name).name} is no input that can run linearly; "
+                f"those are {', '.join(movable) or 'none'}."
+            )

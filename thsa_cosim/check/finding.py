@@ -50,15 +50,22 @@ class CheckReport:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict among the lines that were tried."""
-        found = {finding.verdict for finding in self.findings}
+        """The worst verdict among the lines that were tried; a wrong reset is a warning, as nobody has to use it."""
+        found = {
+            Verdict.WARNING if f.verdict is Verdict.FAILED and "reset" in f.name else f.verdict
+            for f in self.findings
+        }
         return next((v for v in (Verdict.FAILED, Verdict.WARNING) if v in found), Verdict.OK)
 
     @property
     def reuse(self) -> Reuse:
-        """How a runner may use instances: "reset" only where every trial of the reset came out ok."""
-        resets = [finding.verdict for finding in self.findings if finding.name.startswith("reset")]
-        return "reset" if resets and set(resets) == {Verdict.OK} else "fresh"
+        """How a runner may use instances: "reset" only where every trial of the reset came out ok.
+
+        And where something moved until the stop time: a run that shows nothing proves nothing.
+        """
+        needed = [f.verdict for f in self.findings if f.name in ("runs", "whole run")]
+        resets = [f.verdict for f in self.findings if f.name.startswith("reset")]
+        return "reset" if resets and set(resets + needed) == {Verdict.OK} else "fresh"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the report as JSON types."""

@@ -1,23 +1,57 @@
 """The trials of a check. Every one runs through ``batch``: an FMU that crashes, hangs or floods costs lines only."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome
+from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined, try_input_handling
+from thsa_cosim.check import numerics
 from thsa_cosim.check.finding import Finding, Verdict
 from thsa_cosim.fmu import FmuDescription, probe
-from thsa_cosim.fmu.plant import Kind, Reuse
+from thsa_cosim.fmu.inputs import input_modes, is_ours
+from thsa_cosim.fmu.plant import Backend, Kind, Reuse
 from thsa_cosim.signals import FloatArray, Signals
 
-_STEP_OK, _STEP_WARNING = 1e-4, 1e-2
-"""Change of an output, relative to its range, when the communication step is halved."""
 _WARM_UP = 10
 """Cycles before memory is watched: interpreter and allocator settle."""
 _LEAK_BYTES = 2048
 """Growth per cycle that counts as a leak; an interpreter alone stays well below."""
 _SHORT = 200
 """Communication points of a run that is repeated to watch memory."""
+_ONE_BY_ONE = 60
+"""Parameters, and inputs, that are tried one by one at most."""
+_MANY_STEPS = 20_000
+_LONG = 3000
+_LARGER = (10.0, 100.0)
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What the user says about how the FMU is to be tried; what is left out comes from its description."""
+
+    values: Mapping[str, float] = field(default_factory=dict)
+    """Start values, in the FMU's units."""
+    inputs: Signals | None = None
+    time: FloatArray | None = None
+    """(n,) s, communication points."""
+    ends: Mapping[str, float] = field(default_factory=dict)
+    """Value that an input runs to, by name, where ``inputs`` does not say it."""
+    duration: float | None = None
+    step: float | None = None
+    parameters: tuple[str, ...] = ()
+    """Parameters that have to change something; default: all that can."""
+    tolerance: float | None = None
+    kind: Kind | None = None
+    input_mode: str | None = None
+
+    def communication_points(self, description: FmuDescription, *, cut: bool = False) -> FloatArray:
+        """Return the communication points, (n,) s."""
+        if self.time is not None:
+            return self.time
+        return probe.trial_time(description, duration=self.duration, step=self.step, cut=cut)
 
 
 class Trials:
@@ -26,25 +60,37 @@ class Trials:
     def __init__(
         self,
         description: FmuDescription,
-        values: dict[str, float],
-        inputs: Signals | None,
-        time: FloatArray | None,
+        excitation: Excitation,
         deadline_s: float,
         on_finding: Callable[[Finding], None] | None,
     ) -> None:
         self._description = description
-        self._values = values
-        self._inputs = inputs
-        self._time = probe.trial_time(description) if time is None else time
+        self._given = excitation
+        self._values = dict(excitation.values)
+        self._time = excitation.communication_points(description)
+        self._inputs = self._excited()
         self._deadline = deadline_s
         self._on_finding = on_finding
         self._outputs = probe.observed(description)
-        self._kind: Kind = "co-simulation" if description.supports_co_simulation else "model-exchange"
+        self._kind: Kind = excitation.kind or (
+            "co-simulation" if description.supports_co_simulation else "model-exchange"
+        )
+        self._mode = excitation.input_mode
+        self._handling: HandlingTrial | None = None
         self._first = Signals(self._time, {})
         self._changed = {
-            name: value for name, value in probe.changed_parameters(description).items() if name not in values
+            name: value
+            for name, value in probe.changed_parameters(description).items()
+            if name not in self._values
         }
         self.findings: list[Finding] = []
+
+    def _excited(self, *, times: float = 1.0, only: str | None = None) -> Signals | None:
+        if self._given.inputs is not None:
+            return self._given.inputs
+        return probe.kinked_inputs(
+            self._description, self._time, ends=self._given.ends, times=times, only=only
+        )
 
     def _note(self, name: str, verdict: Verdict, text: str, **values: float) -> None:
         finding = Finding(name, verdict, text, values)
@@ -52,31 +98,47 @@ class Trials:
         if self._on_finding is not None:
             self._on_finding(finding)
 
-    def _runner(self, reuse: Reuse = "fresh", kind: Kind | None = None) -> LocalRunner:
-        """Open one worker process with three experiments: "trial", "halved" (step) and "short" (footprint)."""
-        times = {
-            "trial": self._time,
-            "halved": probe.halved(self._time),
-            "short": self._time[: max(2, min(len(self._time), _SHORT))],
-        }
+    def _take(self, name: str, judged: numerics.Judged) -> None:
+        verdict, text, values = judged
+        self._note(name, verdict, text, **values)
+
+    def _experiment(self, name: str, time: FloatArray, inputs: Signals | None = None) -> Experiment:
+        return Experiment(
+            name,
+            self._description.path,
+            inputs or self._inputs,
+            self._outputs,
+            time,
+            self._values,
+            tolerance=self._given.tolerance,
+            input_mode=self._mode if self._kind == "co-simulation" else None,
+        )
+
+    def _runner(
+        self,
+        reuse: Reuse = "fresh",
+        kind: Kind | None = None,
+        more: Sequence[Experiment] = (),
+        backend: Backend | Literal["auto"] | None = "auto",
+    ) -> LocalRunner:
+        """Open one worker process with "trial", "halved" and "doubled" (step), "short" (footprint) and ``more``."""
         experiments = [
-            Experiment(
-                name,
-                self._description.path,
-                self._inputs,
-                self._outputs,
-                time,
-                self._values,
-                reduce=probe.footprint if name == "short" else None,
-            )
-            for name, time in times.items()
+            self._experiment("trial", self._time),
+            self._experiment("halved", probe.halved(self._time)),
+            self._experiment("doubled", self._time[::2] if len(self._time) > 2 else self._time),
+            replace(
+                self._experiment("short", self._time[: max(2, min(len(self._time), _SHORT))]),
+                reduce=probe.footprint,
+            ),
+            *more,
         ]
         return LocalRunner(
             experiments,
             deadline_s=self._deadline,
             reuse=reuse,
             kind=kind or self._kind,
-            backend="python",  # the same bits as machine code, and each process starts a second earlier
+            # The same bits, and a process starts a second earlier than with machine code.
+            backend=("python" if len(self._time) < _LONG else None) if backend == "auto" else backend,
             recycle_growth_mb=1e6,
         )
 
@@ -99,61 +161,139 @@ class Trials:
             if capabilities.get(flag)
         ]
         self._note("demands", Verdict.WARNING if wants else Verdict.OK, "; ".join(wants) or "none")
-        if self._kind == "co-simulation":
-            mode = probe.input_handling(self._description)
-            text = {
-                "derivative": "linear within a step, exactly (input derivatives)",
-                "intermediate": "linear within a step, exactly (intermediate update)",
-                "mean": "held over a step at the mean of its ends (second order in the step)",
-            }[mode]
-            self._note("inputs", Verdict.OK, text)
 
     def first_run(self) -> bool:
-        """Run the default experiment; False if there is nothing to compare later."""
+        """Run once, excited, to the stop time; False if there is nothing to compare later."""
         later = ("fresh instance", "new process", "reset", "communication step", "memory", "file handles")
         if not self._outputs:
             self._note(
                 "runs", Verdict.NOT_TRIED, "it has no floating-point output or local variable to watch"
             )
             return False
-        with self._runner() as runner:
-            outcome = runner.run([Job("trial")])[0]
-        moved = "inputs at their start values" if self._inputs is None else "the given inputs"
-        if outcome.ok and self._inputs is None and not _moves(outcome):
-            self._inputs = probe.raised_inputs(self._description, self._time)
-            raised = outcome
-            if self._inputs is not None:
-                with self._runner() as runner:
-                    raised = runner.run([Job("trial")])[0]
-            if self._inputs is not None and raised.ok:
-                outcome, moved = raised, "inputs ramping away from their start values"
-            else:
-                self._inputs = None
+        doubt = ""
+        outcome = self._try()
+        if not outcome.ok and self._may_be_cut():
+            whole, reason = self._time, outcome.reason
+            self._time = self._given.communication_points(self._description, cut=True)
+            self._inputs = self._excited()
+            outcome = self._try()
+            if outcome.ok:
+                done = f"{np.ptp(self._time):g} s of {np.ptp(whole):g} s"
+                doubt = f"; only {done}, as it fails in longer steps ({reason})"
+        if not outcome.ok and self._given.kind is None and self._kind == "co-simulation":
+            outcome, doubt = self._fall_back(outcome)
         if not outcome.ok or outcome.signals is None:
             self._note("runs", Verdict.FAILED, f"{outcome.status}: {outcome.reason}")
             for name in later:
                 self._note(name, Verdict.NOT_TRIED, "the first run failed")
             return False
         self._first = outcome.signals
-        span = self._time[-1] - self._time[0]
+        does = numerics.moves(outcome.signals)
         steps = len(self._time) - 1
         self._note(
             "runs",
-            Verdict.OK if _moves(outcome) else Verdict.WARNING,
-            f"{self._kind}, {span:g} s in {steps} steps, {moved}"
-            + ("" if _moves(outcome) else "; no output moves, so what follows shows little"),
+            Verdict.OK if does and not doubt else Verdict.WARNING,
+            f"{self._kind}, {np.ptp(self._time):g} s in {steps} steps, {self._moved()}{doubt}"
+            + ("" if does else "; no output moves, so what follows shows little"),
             duration_s=outcome.duration_s,
             steps=steps,
         )
         return True
 
+    def _moved(self) -> str:
+        if self._given.inputs is not None:
+            return "the given inputs"
+        if self._inputs is None:
+            return "no inputs to move"
+        return "inputs ramping away from their start values, with kinks"
+
+    def _try(self) -> Outcome:
+        """Run once; find out how inputs are to be given, and run so."""
+        outcome = self._run_once()
+        told = self._given.input_mode is not None or is_ours(self._description)
+        if told or not outcome.ok or self._kind != "co-simulation":
+            return outcome
+        self._handling = try_input_handling(
+            self._experiment("handling", self._time), deadline_s=self._deadline
+        )
+        best = self._handling.best
+        self._mode = None if best is None else best.mode
+        return self._run_once()
+
+    def _run_once(self) -> Outcome:
+        with self._runner() as runner:
+            return runner.run([Job("trial")])[0]
+
+    def _may_be_cut(self) -> bool:
+        given = self._given
+        return given.time is None and given.step is None and given.duration is None and self._was_coarsened()
+
+    def _was_coarsened(self) -> bool:
+        return len(self._given.communication_points(self._description, cut=True)) != len(self._time)
+
+    def _fall_back(self, failed: Outcome) -> tuple[Outcome, str]:
+        """Try Model Exchange where Co-Simulation does not run."""
+        if not self._description.supports_model_exchange or self._description.fmi_version == "1.0":
+            return failed, ""
+        self._kind = "model-exchange"
+        outcome = self._try()
+        if not outcome.ok:
+            self._kind = "co-simulation"
+            return failed, ""
+        return outcome, f'; Co-Simulation fails ({failed.reason}): set interface = "model-exchange"'
+
+    def inputs_lines(self) -> None:
+        """Say how inputs are given, and which of them do something."""
+        if self._inputs is None:
+            self._note("inputs", Verdict.OK, "it has none that run linearly")
+            return
+        if is_ours(self._description):
+            mode = input_modes(self._description, probe.excitable(self._description))[-1]
+            self._note(
+                "inputs", Verdict.OK, f"linear within a step, exactly ({mode}; an FMU of this toolkit)"
+            )
+        elif self._kind == "model-exchange" or self._handling is not None:
+            trial = self._handling or HandlingTrial("", (), True)
+            self._take("inputs", numerics.judge_handling(trial, self._kind))
+        names = [v.name for v in probe.excitable(self._description)][:_ONE_BY_ONE]
+        if self._given.inputs is not None or len(names) < 2:
+            return
+        still = Signals(
+            self._time, {n: np.full(len(self._time), v[0]) for n, v in self._inputs.values.items()}
+        )
+        alone = [self._experiment("none", self._time, still)]
+        alone += [self._experiment(f"input {n}", self._time, self._excited(only=n)) for n in names]
+        with self._runner(more=alone) as runner:
+            outcomes = runner.run([Job(e.name) for e in alone])
+        if outcomes[0].signals is not None:
+            changed = dict(zip(names, outcomes[1:], strict=True))
+            self._take("each input", numerics.judge_changes(outcomes[0].signals, changed, "inputs"))
+
+    def start_value_line(self) -> None:
+        """Change one start value after the other: each must change something, compared with a fresh instance."""
+        name = "start values"
+        changed = probe.changed_parameters(self._description, zeros=True)
+        named = self._given.parameters or tuple(n for n in changed if n not in self._values)
+        tried = {n: changed[n] for n in named[:_ONE_BY_ONE] if n in changed}
+        if not tried:
+            self._note(name, Verdict.NOT_TRIED, "it has no parameter to change")
+            return
+        # Machine code takes a second to load, and pays where there are many steps.
+        many = len(tried) * len(self._time) > _MANY_STEPS
+        with self._runner(backend=None if many else "python") as runner:
+            outcomes = runner.run([Job("trial", {n: v}) for n, v in tried.items()])
+        found = dict(zip(tried, outcomes, strict=True))
+        self._take(name, numerics.judge_changes(self._first, found, "start values"))
+
     def fresh_lines(self, cycles: int) -> bool:
         """Use a new instance per run; return whether the FMU runs with other start values."""
         with self._runner() as runner:
-            first, second, halved = runner.run([Job("trial"), Job("trial"), Job("halved")])
+            first, second, halved, doubled = runner.run(
+                [Job("trial"), Job("trial"), Job("halved"), Job("doubled")]
+            )
             self._compare("new process", first, "the first run in another process")
             self._compare("fresh instance", second, "a second instance in one process")
-            self._step_line(halved)
+            self._step_lines(halved, doubled)
             self._leak_lines("instances", runner.run([Job("short")] * (_WARM_UP + cycles)))
             return runner.run([Job("trial", self._changed)])[0].ok
 
@@ -174,41 +314,52 @@ class Trials:
                 self._note(name, Verdict.NOT_TRIED, why)
             self._leak_lines("resets", runner.run([Job("short")] * (_WARM_UP + cycles)))
 
-    def _step_line(self, outcome: Outcome) -> None:
+    def _step_lines(self, halved: Outcome, doubled: Outcome) -> None:
         name = "communication step"
         if self._kind != "co-simulation":
-            self._note(name, Verdict.NOT_TRIED, "Model Exchange only: the importer's solver steps")
+            self._note(name, Verdict.NOT_TRIED, "Model Exchange: the importer's solver steps")
             return
-        if not outcome.ok or outcome.signals is None:
-            self._note(name, Verdict.WARNING, f"halved, it fails: {outcome.status}: {outcome.reason}")
+        step = float(self._time[1] - self._time[0])
+        judged = numerics.judge_step(self._first, halved, step)
+        self._take(name, judged)
+        if len(self._time) > 2 and self._given.inputs is None:  # else the step is the user's
+            change = judged[2].get("change", 0.0)
+            self._take("longer step", numerics.judge_longer_step(self._first, doubled, step, change))
+
+    def larger_inputs_line(self) -> None:
+        """Inputs of which nobody says how large they are: try larger ones, too."""
+        unknown = [v for v in probe.excitable(self._description) if probe.is_undeclared(v)]
+        unknown = [v for v in unknown if v.name not in self._given.ends]
+        if self._given.inputs is not None or not unknown or self._kind != "co-simulation":
             return
-        coarse = {n: outcome.signals[n][::2] for n in self._outputs}
-        change, worst = _largest_change(self._first, coarse)
-        verdict = (
-            Verdict.OK
-            if change <= _STEP_OK
-            else Verdict.WARNING
-            if change <= _STEP_WARNING
-            else Verdict.FAILED
-        )
-        text = f"halving {self._time[1] - self._time[0]:g} s changes {worst} by {change:.1e} of its range"
-        self._note(name, verdict, text if change else "halving it changes nothing", change=change)
+        if is_ours(self._description):  # it controls its own step
+            return
+        larger = {times: self._excited(times=times) for times in _LARGER}
+        grids = {"h": self._time, "h/2": refined(self._time, 2)}
+        more = [
+            self._experiment(f"{times:g} {grid}", time, inputs)
+            for times, inputs in larger.items()
+            for grid, time in grids.items()
+        ]
+        with self._runner(more=more) as runner:
+            outcomes = runner.run([Job(e.name) for e in more])
+        pairs = [(times, outcomes[2 * i], outcomes[2 * i + 1]) for i, times in enumerate(larger)]
+        largest = {
+            times: ", ".join(f"{v.name} to {np.max(np.abs(s[v.name])):g}" for v in unknown[:3])
+            for times, s in larger.items()
+            if s is not None
+        }
+        self._take("larger inputs", numerics.judge_larger_inputs(pairs, largest))
 
     def exchange_line(self) -> None:
         """Compare Co-Simulation with Model Exchange, integrated by the importer at a tight tolerance."""
         name = "model exchange"
         if self._kind != "co-simulation" or not self._description.supports_model_exchange:
-            self._note(name, Verdict.NOT_TRIED, "it has one interface only")
+            self._note(name, Verdict.NOT_TRIED, "it has one interface only, or was tried with one")
             return
         with self._runner(kind="model-exchange") as runner:
             outcome = runner.run([Job("trial")])[0]
-        if not outcome.ok or outcome.signals is None:
-            self._note(name, Verdict.FAILED, f"{outcome.status}: {outcome.reason}")
-            return
-        change, worst = _largest_change(self._first, dict(outcome.signals.values))
-        verdict = Verdict.OK if change <= 1e-3 else Verdict.WARNING
-        text = f"{worst} differs from Co-Simulation by {change:.1e} of its range"
-        self._note(name, verdict, text, change=change)
+        self._take(name, numerics.judge_exchange(self._first, outcome))
 
     def _leak_lines(self, way: str, outcomes: Sequence[Outcome]) -> None:
         memory, files = f"memory over {way}", f"file handles over {way}"
@@ -241,21 +392,6 @@ class Trials:
         if all(np.array_equal(self._first[n], found[n]) for n in self._outputs):
             self._note(name, Verdict.OK, f"{what} is bit-identical", change=0.0)
             return
-        change, worst = _largest_change(self._first, found)
+        change, worst = largest_change(self._first.values, found)
         verdict = Verdict.WARNING if change < 1e-9 else Verdict.FAILED
         self._note(name, verdict, f"{what} changes {worst} by {change:.1e} of its range", change=change)
-
-
-def _moves(outcome: Outcome) -> bool:
-    return outcome.signals is not None and any(np.ptp(v) > 0.0 for v in outcome.signals.values.values())
-
-
-def _largest_change(first: Signals, found: Mapping[str, FloatArray]) -> tuple[float, str]:
-    """Return the largest deviation relative to each signal's range (or size, if constant), and whose it is."""
-    changes = {}
-    for name in first.names:
-        difference = float(np.max(np.abs(found[name] - first[name])))
-        scale = max(float(np.ptp(first[name])), 1e-6 * float(np.max(np.abs(first[name]))))
-        changes[name] = 0.0 if difference == 0.0 else difference / scale if scale > 0.0 else np.inf
-    worst = max(changes, key=lambda name: changes[name])
-    return changes[worst], worst

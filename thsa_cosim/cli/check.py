@@ -8,13 +8,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from thsa_cosim.cli.options import PATH, console
+from thsa_cosim.errors import ScenarioError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from thsa_cosim.check import CheckReport
+    from thsa_cosim.scenario import Scenario, StagedScenario, TuneScenario
+
 Checked = tuple[Mapping[str, Any], Callable[["Console"], None]]
 """The report as JSON types, and how to print it."""
 
+POSITIVE = click.FloatRange(min=0.0, min_open=True)
+_WORSE = ["ok", "warning", "failed"].index
 FAILED = 3
 """Exit code of a check whose verdict is "failed"."""
 
@@ -23,13 +29,41 @@ FAILED = 3
 @click.argument("path", type=PATH)
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
 @click.option("-o", "--output", type=PATH, default=None, help="Write the findings as JSON to this file, too.")
-def check(path: Path, as_json: bool, output: Path | None) -> int:
+@click.option("--duration", type=POSITIVE, help="FMU: s to simulate; default what it declares.")
+@click.option("--step", type=POSITIVE, help="FMU: s between communication points; default what it declares.")
+@click.option(
+    "--deadline", type=POSITIVE, default=30.0, show_default=True, help="FMU: s that a run may take."
+)
+@click.option("--start", "starts", multiple=True, metavar="NAME=VALUE", help="FMU: a start value.")
+@click.option(
+    "--input", "ends", multiple=True, metavar="NAME=VALUE", help="FMU: value that an input runs to."
+)
+@click.option(
+    "--compile", "compiled", type=PATH, help="FMU: first build its C sources; write the FMU to this file."
+)
+def check(
+    path: Path,
+    as_json: bool,
+    output: Path | None,
+    duration: float | None,
+    step: float | None,
+    deadline: float,
+    starts: tuple[str, ...],
+    ends: tuple[str, ...],
+    compiled: Path | None,
+) -> int:
     """Say what an FMU, a recording or a scenario is, and what it can be trusted with.
 
     PATH is told by its ending: .toml is a scenario, .csv, .parquet, .mat and the like a recording, all else an FMU.
-    The exit code is 3 if the verdict is "failed".
+    An FMU is run in processes of its own with inputs that move, up to its stop time; that of a scenario with the
+    scenario's own recordings, step and start values. The exit code is 3 if the verdict is "failed".
     """
-    content, show = _checked(path)
+    if compiled is not None:
+        from thsa_cosim.fmu.sources import compile_sources
+
+        path = compile_sources(path, compiled)
+    given = {"duration": duration, "step": step, "values": _pairs(starts), "ends": _pairs(ends)}
+    content, show = _checked(path, given, deadline)
     text = json.dumps(content, indent=2)
     if output is not None:
         output.write_text(text + "\n", encoding="utf-8")
@@ -40,19 +74,32 @@ def check(path: Path, as_json: bool, output: Path | None) -> int:
     return FAILED if content["verdict"] == "failed" else 0
 
 
-def _checked(path: Path) -> Checked:
+def _pairs(texts: tuple[str, ...]) -> dict[str, float]:
+    pairs = {}
+    for text in texts:
+        name, separator, value = text.rpartition("=")
+        try:
+            pairs[name.strip()] = float(value)
+        except ValueError:
+            separator = ""
+        if not separator:
+            raise click.UsageError(f"{text!r} is no NAME=VALUE with a number.")
+    return pairs
+
+
+def _checked(path: Path, given: Mapping[str, Any], deadline: float) -> Checked:
     from thsa_cosim.recordings import SUFFIXES
 
     if path.suffix.lower() == ".toml":
-        return _scenario(path)
-    return _recording(path) if path.suffix.lower() in SUFFIXES else _fmu(path)
+        return _scenario(path, deadline)
+    return _recording(path) if path.suffix.lower() in SUFFIXES else _fmu(path, given, deadline)
 
 
-def _fmu(path: Path) -> Checked:
-    from thsa_cosim.check import check_fmu
+def _fmu(path: Path, given: Mapping[str, Any], deadline: float) -> Checked:
+    from thsa_cosim.check import Excitation, check_fmu
     from thsa_cosim.report.check import print_check
 
-    report = check_fmu(path)
+    report = check_fmu(path, excitation=Excitation(**given), deadline_s=deadline)
     return {"kind": "fmu", **report.to_dict()}, lambda out: print_check(out, report)
 
 
@@ -64,33 +111,80 @@ def _recording(path: Path) -> Checked:
     return report.to_dict(), lambda out: print_file(out, report)
 
 
-def _scenario(path: Path) -> Checked:
+def _scenario(path: Path, deadline: float) -> Checked:
     """A scenario loads, or says in one sentence why not; then its data and its FMU."""
     from thsa_cosim.inspection import Inspection
+    from thsa_cosim.report.check import print_check
     from thsa_cosim.report.inspection import print_inspection
-    from thsa_cosim.scenario import Scenario, StagedScenario, load_tune
-    from thsa_cosim.scenario.load import read_toml
-    from thsa_cosim.scenario.stages import load_study
+    from thsa_cosim.scenario import Scenario, StagedScenario, load
 
-    loaded = load_tune(path) if read_toml(path).get("kind") == "tune" else load_study(path)
+    loaded = load(path)
     scenarios = (
         [stage.scenario for stage in loaded.stages] if isinstance(loaded, StagedScenario) else [loaded]
     )
     of_recordings = [s.data for s in scenarios if isinstance(s, Scenario)]
     findings = tuple(f for data in of_recordings for f in data.findings)
     data = Inspection.of(findings, tuple(s for data in of_recordings for s in data.repairs))
-    verdict = {"good": "ok", "usable": "warning", "bad": "failed"}[data.verdict]
+    report = _fmu_of(loaded, deadline)
+    verdict = max(
+        {"good": "ok", "usable": "warning", "bad": "failed"}[data.verdict], str(report.verdict), key=_WORSE
+    )
     content = {
         "kind": "scenario",
         "path": str(path),
         "scenario": {"kind": loaded.kind, "title": loaded.title},
         "data": data.to_dict(),
+        "fmu": report.to_dict(),
         "verdict": verdict,
     }
 
     def show(out: "Console") -> None:
         out.print(f"{path}: a scenario of kind {loaded.kind!r} that loads", highlight=False, markup=False)
         print_inspection(out, data, remedies=True)
+        print_check(out, report)
         out.print(f"verdict: {verdict}", highlight=False)
 
     return content, show
+
+
+def _fmu_of(loaded: "Scenario | StagedScenario | TuneScenario", deadline: float) -> "CheckReport":
+    """Try the FMU of a scenario with its own excitation: the first recording to fit, or the first condition."""
+    from thsa_cosim.check import Excitation, check_fmu
+    from thsa_cosim.identify.problem import build_point
+    from thsa_cosim.scenario import StagedScenario, TuneScenario
+    from thsa_cosim.tune.problem import build_groups
+
+    if isinstance(loaded, StagedScenario):
+        loaded = loaded.stages[0].scenario
+    spec = loaded.simulation
+    values: dict[str, float] = {}
+    searched: tuple[str, ...] = ()
+    if isinstance(loaded, TuneScenario):
+        experiment = build_groups(loaded)[0].cases[0].experiment
+        searched = tuple(p.variable for p in loaded.parameters.parameters)
+    else:
+        if not loaded.points or not loaded.points[0].fit:
+            raise ScenarioError(f"{loaded.path} names no recording to try its FMU with; name one under fit.")
+        point = build_point(loaded, loaded.points[0])
+        case = point.cases[0]
+        experiment = case.experiment(case.name, None)
+        start = point.space.physical(point.space.start()[None, :])[0]
+        named = dict(zip(point.space.names, start.tolist(), strict=True))
+        values = point.space.assignments(named, case.name)
+        searched = tuple(n for n in values if n not in experiment.wrapper_names)
+    own = experiment.wrapper_names
+    values = {n: v for n, v in {**experiment.fixed, **values}.items() if n not in own}
+    return check_fmu(
+        experiment.fmu,
+        excitation=Excitation(
+            values,
+            experiment.inputs,
+            experiment.time,
+            parameters=searched,
+            tolerance=spec.tolerance,
+            kind=spec.interface,
+            input_mode=spec.inputs,
+        ),
+        deadline_s=min(spec.deadline, deadline),
+        cycles=20,
+    )

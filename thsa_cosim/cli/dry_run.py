@@ -9,8 +9,8 @@ import click
 from thsa_cosim.cli.options import StudyOptions, console
 
 if TYPE_CHECKING:
+    from thsa_cosim.api.conduct import Asked
     from thsa_cosim.api.forecast import Forecast
-    from thsa_cosim.scenario import Scenario, StagedScenario, TuneScenario
 
 dry_run_option = click.option(
     "--dry-run",
@@ -19,26 +19,26 @@ dry_run_option = click.option(
 )
 
 
-def show_forecast(options: StudyOptions, study: "Scenario | StagedScenario | TuneScenario") -> None:
+def show_forecast(options: StudyOptions, asked: "Asked") -> None:
     """Print the forecast of a scenario that was loaded, as tables or as JSON."""
     from thsa_cosim.api.forecast import forecast
 
-    place = options.place()
-    found = forecast(study, workers=place["workers"], cluster=place["cluster"])
+    place = asked.place
+    found = forecast(asked.scenario, place.executor)
     if options.as_json:
         content = {
-            "folder": str(place["folder"]),
-            "workers": place["workers"],
+            "folder": str(place.folder),
+            "workers": place.executor.workers,
             "runs": sum(f.runs for f in found),
             "seconds": sum(f.seconds for f in found),
             "parts": [{**asdict(f), "runs": f.runs, "seconds": f.seconds} for f in found],
         }
         click.echo(json.dumps(content, indent=2))
         return
-    _print(options, found)
+    _print(asked, found)
 
 
-def _print(options: StudyOptions, found: "tuple[Forecast, ...]") -> None:
+def _print(asked: "Asked", found: "tuple[Forecast, ...]") -> None:
     from rich.table import Table
     from rich.text import Text
 
@@ -71,6 +71,6 @@ def _print(options: StudyOptions, found: "tuple[Forecast, ...]") -> None:
     if len(found) > 1:
         much = "about" if any(part.expected for part in found) else "at most"
         out.print(f"together {much} {duration(sum(part.seconds for part in found))}", highlight=False)
-    folder = options.place()["folder"]
+    folder = asked.place.folder
     what = "would be continued" if folder.exists() else "would be made"
     out.print(f"the study folder {folder} {what}; nothing was written", highlight=False, soft_wrap=True)

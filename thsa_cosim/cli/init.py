@@ -34,9 +34,12 @@ def init(fmu: Path, recordings: tuple[Path, ...], output: Path) -> None:
     """Write a commented scenario that drives an FMU with a recording and compares.
 
     Columns are matched to the FMU's inputs and outputs by name, description and unit; what fits nowhere is listed in
-    the file. It runs as it is.
+    the file. It runs as it is. A page beside it shows the recordings as the scenario reads them, with what was found in
+    them.
     """
     from thsa_cosim.draft import draft_scenario
+    from thsa_cosim.report.inspection import print_inspection
+    from thsa_cosim.report.preview import write_preview
     from thsa_cosim.scenario import load_scenario
     from thsa_cosim.system import read_description
 
@@ -47,10 +50,20 @@ def init(fmu: Path, recordings: tuple[Path, ...], output: Path) -> None:
     output.write_text(draft.text, encoding="utf-8")
     _print(draft)
     try:
-        load_scenario(output)
+        scenario = load_scenario(output)
     except InputError as error:
         raise InputError(f"The scenario was written, but needs your hand: {error}") from None
-    click.echo(f"\n{output} is ready: thsa-cosim simulate {output}")
+    print_inspection(console(), scenario.data, remedies=True)
+    preview = write_preview(scenario, draft, output.with_suffix(".html"))
+    click.echo(f"\nThe recordings as the scenario reads them: {preview}")
+    if draft.undriven:
+        names = ", ".join(variable.name for variable in draft.undriven)
+        click.echo(
+            f"{output} is not ready: nothing drives {names}, so that the model rests; name the column under"
+            f" [recordings.columns.{draft.undriven[0].name}], if it is not meant to be constant."
+        )
+        return
+    click.echo(f"{output} is ready: thsa-cosim simulate {output}")
 
 
 def _print(draft: "Draft") -> None:
@@ -71,6 +84,8 @@ def _print(draft: "Draft") -> None:
         table.add_row(Text(variable.name), "output", "–", Text(variable.unit or ""), "not compared")
     out = console()
     out.print(table)
+    for name, reason in draft.unused.items():
+        out.print(Text(f"column {name!r} is not used: it {reason}"))
     if draft.unmatched_columns:
         names = ", ".join(column.name for column in draft.unmatched_columns)
         out.print(Text(f"columns that fit nowhere: {names}"))

@@ -3,40 +3,22 @@
 import functools
 import shlex
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypedDict
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
 
 import click
 
-from thsa_cosim.api import cores, default_folder
-from thsa_cosim.errors import InputError, ThsaCosimError
+from thsa_cosim.errors import StudyError, ThsaCosimError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from thsa_cosim.scenario import Scenario
+    from thsa_cosim.api.conduct import Asked, Conducted
 
 PATH = click.Path(path_type=Path)
 
 P = ParamSpec("P")
-
-
-class Overrides(TypedDict):
-    """What the command line replaces in a scenario: keyword arguments of its loader."""
-
-    fit: tuple[Path, ...]
-    validate: tuple[Path, ...]
-    seed: int | None
-    fmu: Path | None
-
-
-class Place(TypedDict):
-    """Where a study runs and is kept: keyword arguments of the use cases."""
-
-    folder: Path
-    workers: int
-    cluster: str | None
 
 
 @dataclass(frozen=True)
@@ -55,20 +37,35 @@ class StudyOptions:
     as_json: bool
     report: bool
 
-    @property
-    def overrides(self) -> Overrides:
-        """What replaces the scenario's own recordings, seed and FMU."""
-        return {"fit": self.fit, "validate": self.validate, "seed": self.seed, "fmu": self.fmu}
+    def ask(self, command: str, package: Path | None = None) -> "Asked":
+        """Load the scenario for ``command``; nothing is written yet."""
+        from thsa_cosim.api.conduct import ask
 
-    def place(self, suffix: str = "") -> Place:
-        """Return folder, workers and cluster, with their defaults; ``suffix`` goes into the folder's."""
-        return {
-            "folder": self.output or default_folder(self.scenario, suffix),
-            "workers": self.workers or cores(),
-            "cluster": self.cluster,
-        }
+        return ask(
+            command,
+            self.scenario,
+            folder=self.output,
+            fit=self.fit,
+            validate=self.validate,
+            seed=self.seed,
+            fmu=self.fmu,
+            package=package,
+            workers=self.workers,
+            cluster=self.cluster,
+            repeat=lambda folder: self.repeat(command, folder, package),
+        )
 
-    def repeat(self, command: str, folder: Path) -> str:
+    def conduct(self, asked: "Asked") -> "Conducted":
+        """Conduct the study and write its page, unless that was declined; Interrupted if it was cut short."""
+        from thsa_cosim.api.conduct import conduct
+
+        done = conduct(asked, quiet=self.quiet)
+        done = replace(done, files=(*done.files, *self.page(done.folder)))
+        if done.status == "interrupted":
+            raise Interrupted(asked.place.command)
+        return done
+
+    def repeat(self, command: str, folder: Path, package: Path | None = None) -> str:
         """The command line that repeats the study, or continues it, with its folder spelt out."""
         words = ["thsa-cosim", command, str(self.scenario)]
         for option, given in (("--fit", self.fit), ("--validate", self.validate)):
@@ -78,6 +75,7 @@ class StudyOptions:
             "--fmu": self.fmu,
             "--workers": self.workers,
             "--cluster": self.cluster,
+            "--package": package,
         }
         for option, value in others.items():
             words += [] if value is None else [option, str(value)]
@@ -95,31 +93,24 @@ class StudyOptions:
             click.echo(f"note: no page was written: {error}", err=True)
             return []
 
-    def show_data(self, *scenarios: "Scenario") -> None:
-        """Print on stderr, one line each, what is wrong with the recordings, before anything is searched."""
-        from thsa_cosim.report.inspection import print_inspection
+    def conclude(self, done: "Conducted", note: str = "") -> None:
+        """Print result.json, or tables and where the files are, or nothing; StudyError if the result is of no use."""
+        from thsa_cosim.report.files import RESULT
 
-        if self.quiet:
-            return
-        out = console(stderr=True)
-        for scenario in scenarios:
-            print_inspection(out, scenario.data, notes=False)
-
-    def check_kind(self, kind: str, wanted: str) -> None:
-        """InputError, with the command to use, if the scenario is of another kind."""
-        if kind != wanted:
-            raise InputError(
-                f"{self.scenario} is a scenario of kind {kind!r}: run 'thsa-cosim {kind} {self.scenario}'."
-            )
-
-    def conclude(self, result: Path, files: int, show: Callable[["Console"], None]) -> None:
-        """Print result.json at ``result``, or what ``show`` prints and where the files are, or nothing."""
+        result = done.folder / RESULT
         if self.as_json:
             click.echo(result.read_text(encoding="utf-8"), nl=False)
         elif not self.quiet:
             out = console()
-            show(out)
-            out.print(f"\n{files} files in {result.parent}; the numbers are in {result}", soft_wrap=True)
+            done.show(out)
+            if note:
+                out.print(note, highlight=False, markup=False, soft_wrap=True)
+            out.print(
+                f"\n{len(set(done.files))} files in {done.folder}; the numbers are in {result}",
+                soft_wrap=True,
+            )
+        if done.objection:
+            raise StudyError(done.objection)
 
 
 _OPTIONS = (

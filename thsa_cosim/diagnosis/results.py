@@ -53,6 +53,8 @@ class FoundEffect:
     parameters: Mapping[str, Value]
     equivalent: tuple[str, ...]
     probability: float
+    order: str = ""
+    """How often it repeats, and over the turn of which shaft; "" if over none."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,28 @@ class Dependence:
     mean_before: float
     mean_after: float
     stderr: float
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a balance misses over its ``cause``, in bins (n,): measured with standard errors, and by both models.
+
+    ``left`` is the signal on the balance's left side, whose ``unit`` the residual has; ``part`` the recordings;
+    ``share`` of the residual's power that depends on the cause. ``before`` and ``after`` are NaN where there is none.
+    """
+
+    equation: str
+    unit: str
+    left: str
+    part: str
+    cause: str
+    cause_unit: str
+    share: float
+    at: tuple[float, ...]
+    measured: tuple[float, ...]
+    stderr: tuple[float, ...]
+    before: tuple[float, ...]
+    after: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -175,6 +199,7 @@ class DiagnosisResult:
     """Of an FMU without source, in place of the two: the effects around it."""
     judged: tuple[Judged, ...]
     balances: tuple[Balance, ...]
+    evidence: Evidence | None
     dependence: tuple[Dependence, ...]
     empirical: EmpiricalLaw | None
     equivalence: tuple[EquivalenceClass, ...]

@@ -1,6 +1,6 @@
 """The use case: scenario → superset → attribution → closure → verdict."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,18 +10,21 @@ from thsa_cosim import __version__
 from thsa_cosim.diagnosis.blackbox.prepare import BlackBox, wrap_black_box
 from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
+from thsa_cosim.diagnosis.catalogue.effect import Effect
 from thsa_cosim.diagnosis.catalogue.extend import write_extended_model
 from thsa_cosim.diagnosis.catalogue.known import choose, known_effects
 from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, values_of
+from thsa_cosim.diagnosis.choosing.orders import Machine, machine_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.explaining.balance import close_balances
 from thsa_cosim.diagnosis.explaining.dependence import dependence
 from thsa_cosim.diagnosis.explaining.empirical import LawSearch, law_of
+from thsa_cosim.diagnosis.explaining.evidence import evidence
 from thsa_cosim.diagnosis.explaining.experiment import separating_experiment
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
@@ -32,27 +35,20 @@ from thsa_cosim.diagnosis.fitting.trials import Trial, spec_of, trials_of, with_
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import ChannelError, Comparison, DiagnosisResult, EmpiricalLaw
 from thsa_cosim.errors import StudyError
+from thsa_cosim.export.compile import this_platform
 from thsa_cosim.identify import Comparison as Compared
 from thsa_cosim.identify import ForceBalance, force_balance
-from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
-from thsa_cosim.study import describe, open_study, study_identity
+from thsa_cosim.scenario import DiagnoseSpec, Scenario
+from thsa_cosim.study import Place, Study, describe, study_identity
 
 #: The folder of the superset inside a study.
 WORK = "superset"
 
-Say = Callable[[str], None]
 
-
-def diagnose(
-    scenario: Scenario,
-    *,
-    folder: Path,
-    workers: int = 1,
-    cluster: str | None = None,
-    on_progress: Say | None = None,
-    command: str = "",
-) -> DiagnosisResult:
+def diagnose(scenario: Scenario, place: Place) -> DiagnosisResult:
     """Find what the scenario's model lacks, add it, and report held-out errors before and after.
+
+    What the folder of ``place`` holds of the same study is continued, run by run.
 
     Raises
     ------
@@ -64,20 +60,34 @@ def diagnose(
         If the declared model cannot be simulated.
     """
     spec = spec_of(scenario)
-    say = on_progress or (lambda _: None)
     trials = trials_of(scenario)
     unknowns = declared_unknowns(scenario, trials)
     effects = choose(known_effects(spec.catalogue), spec.effects, f"{scenario.path}: diagnose.effects")
-    open_study(folder, study_identity(scenario), describe(scenario, command))
+    with Study.open(place, study_identity(scenario), describe(scenario)) as study:
+        result = _diagnose(scenario, spec, study, trials, unknowns, effects.values())
+        study.complete()
+    return result
+
+
+def _diagnose(
+    scenario: Scenario,
+    spec: DiagnoseSpec,
+    study: Study,
+    trials: tuple[Trial, ...],
+    unknowns: Unknowns,
+    effects: Iterable[Effect],
+) -> DiagnosisResult:
+    """Everything after the folder was claimed."""
+    say = study.place.say
     cases = [t.case for t in trials if t.part == "fit"]
     tested: Superset | BlackBox
     if spec.model is None:
         say("measuring the drive of the black box")
-        box = tested = wrap_black_box(scenario, cases, effects.values())
+        box = tested = wrap_black_box(scenario, cases, effects)
         declared = driven = with_wrapper(trials, tested.wrapper)
     else:
         say("exporting the superset of all effects")
-        box, tested = None, open_superset(scenario, spec.model, cases, effects.values(), folder / WORK)
+        box, tested = None, open_superset(scenario, spec.model, cases, effects, study.folder / WORK)
         declared, driven = trials, with_fmu(trials, tested.fmu)
     say("identifying the declared model from the drawing")
     before = identify_model(
@@ -86,33 +96,23 @@ def diagnose(
         unknowns,
         [unknowns.start],
         scenario.simulation,
-        workers,
-        cluster,
+        study.open_runner,
     )
-    with open_runner(scenario.simulation, [t.experiment for t in driven], workers, cluster) as runner:
+    with study.open_runner(scenario.simulation, [t.experiment for t in driven]) as runner:
         bench = Bench(runner, driven)
-        scan = wave_number_finder(bench, tested.slots, tested.signals_at)
         start = before.fit.vector
+        at_start = {t.case.name: unknowns.assignments(start, t.group) for t in driven if t.part == "fit"}
+        machine = machine_of(tested.slots, tested.signals_at(at_start))
+        scan = wave_number_finder(bench, tested.slots, tested.signals_at, machine)
         found = attribute(
             bench, unknowns, tested.candidates, scan, start=start, seed=scenario.seed, most=spec.most, say=say
         )
     if found is None:
         reason = next(iter(bench.failures), "no run succeeded")
         raise StudyError(f"{scenario.path}: the model with all effects cannot be simulated: {reason}")
+    names = tuple(effect.name for effect in effects)
     return _Closing(
-        scenario,
-        spec,
-        folder,
-        workers,
-        cluster,
-        trials,
-        unknowns,
-        before,
-        found,
-        bench,
-        say,
-        tuple(effects),
-        box,
+        scenario, spec, study, trials, unknowns, before, found, bench, names, machine, box
     ).result()
 
 
@@ -122,16 +122,14 @@ class _Closing:
 
     scenario: Scenario
     spec: DiagnoseSpec
-    folder: Path
-    workers: int
-    cluster: str | None
+    study: Study
     trials: tuple[Trial, ...]
     unknowns: Unknowns
     before: Identified
     found: Attribution
     bench: Bench
-    say: Say
     effects: tuple[str, ...]
+    machine: Machine
     box: BlackBox | None = None
 
     def result(self) -> DiagnosisResult:
@@ -149,36 +147,44 @@ class _Closing:
             wider = extended_unknowns(self.unknowns, accepted)
             hint = found.final.at(wider.names)
             if self.box is None:
-                self.say(f"exporting the model with {', '.join(s.candidate.name for s in accepted)}")
+                self.study.place.say(
+                    f"exporting the model with {', '.join(s.candidate.name for s in accepted)}"
+                )
                 assert self.spec.model is not None
                 model, extended = write_extended_model(
-                    self.folder, self.spec.model, self.spec.package, *_built(accepted, found.final)
+                    self.study.folder, self.spec.model, self.spec.package, *_built(accepted, found.final)
                 )
-            self.say("identifying the extended model from the drawing")
+            self.study.place.say("identifying the extended model from the drawing")
             after = self._identify(extended or scenario.fmu.path, wider, [wider.start, hint], accepted)
             if self.box is not None:
                 values = {**after.trials[0].case.fixed, **after.fit.unknowns.named(after.fit.vector)}
-                wrapper = write_wrapper(self.folder, scenario.fmu.path, self.box.wrapper, values)
+                wrapper = write_wrapper(self.study.folder, scenario.fmu.path, self.box.wrapper, values)
         held_out = tuple(t for t in self.trials if t.part == "validate")
         share = left_over(held_out, before.validate, after.validate)
         verdict = verdict_on(errors(held_out, after.validate), len(accepted), _tested(found))
         law: EmpiricalLaw | None = None
         if verdict == "unexplained-structure" and self.box is None:
-            self.say("looking for an empirical law")
+            self.study.place.say("looking for an empirical law")
             search = LawSearch(
-                scenario, self.spec, self.trials, self.unknowns, accepted, after, self.folder / WORK,
-                self.workers, self.cluster,
+                scenario, self.spec, self.trials, self.unknowns, accepted, after, self.study.folder / WORK,
+                self.study.open_runner,
             )  # fmt: skip
             terms = search.find()
             law = None if terms is None else law_of(terms, added=self.spec.empirical)
             if terms is not None and self.spec.empirical:
                 # The share stays that of the effects: a law describes and explains nothing.
                 model, extended, after = self._with_law(terms)
+        if model is not None and extended is not None and (here := this_platform()):
+            notes.append(
+                f"{extended.name} is for {here[0]} only; thsa-cosim export {model} --package {self.spec.package}"
+                f" -o {extended} compiles it for all platforms"
+            )
         counts = dict(self.bench.failures)
         changed = after is not before
         for identified in (before, after) if changed else (before,):
             for reason, count in identified.failures.items():
                 counts[reason] = counts.get(reason, 0) + count
+        balances = close_balances(scenario, self.spec)
         return DiagnosisResult(
             title=scenario.title or scenario.path.stem,
             status="complete",
@@ -188,7 +194,7 @@ class _Closing:
             fmu=scenario.fmu.path,
             fmu_sha256=scenario.fmu.sha256,
             verdict=verdict,
-            effects=found_effects(found, after.fit),
+            effects=found_effects(found, after.fit, self.machine),
             before=_errors(before),
             after=_errors(after) if changed else {"fit": {}, "validate": {}},
             recordings_before=_errors_by_recording(before),
@@ -200,12 +206,13 @@ class _Closing:
             extended_fmu=extended,
             wrapper=wrapper,
             judged=judged(found),
-            balances=close_balances(scenario, self.spec),
+            balances=balances,
+            evidence=evidence(scenario, balances, self.trials, before, after if changed else None),
             dependence=dependence(scenario, self.trials, before, after),
             empirical=law,
             equivalence=equivalence(found),
             experiment=separating_experiment(
-                scenario, self.spec, found, self.bench.trials, self.workers, self.cluster
+                scenario, self.spec, found, self.bench.trials, self.study.open_runner
             ),
             comparisons=_comparisons(before, after if changed else None),
             force_before=_force(scenario, before),
@@ -222,7 +229,7 @@ class _Closing:
         base = self.found.base
         if self.found.base_cost > self.before.fit.cost - 1.0:
             return self.before
-        self.say("identifying the declared model from where the search came to")
+        self.study.place.say("identifying the declared model from where the search came to")
         return self._identify(
             self.scenario.fmu.path, self.unknowns, [self.before.fit.vector, base.vector], ()
         )
@@ -232,7 +239,7 @@ class _Closing:
         assert self.spec.model is not None
         added = (*self.found.accepted, *terms.accepted)
         model, extended = write_extended_model(
-            self.folder, self.spec.model, self.spec.package, *_built(added, terms.final)
+            self.study.folder, self.spec.model, self.spec.package, *_built(added, terms.final)
         )
         wider = extended_unknowns(self.unknowns, added)
         hint = terms.final.at(wider.names)
@@ -244,9 +251,7 @@ class _Closing:
         trials = self.trials
         if self.box is not None:
             trials = with_wrapper(trials, self.box.wrapper, fixed_shapes(accepted))
-        return identify_model(
-            fmu, trials, unknowns, starts, self.scenario.simulation, self.workers, self.cluster
-        )
+        return identify_model(fmu, trials, unknowns, starts, self.scenario.simulation, self.study.open_runner)
 
 
 def _built(accepted: Sequence[Scored], final: Fit) -> tuple[list[Candidate], dict[str, float]]:

@@ -39,6 +39,16 @@ _SHORT = {
     "cmd": "command", "ref": "reference", "set": "reference", "temp": "temperature", "vel": "velocity",
     "pos": "position", "cur": "current", "curr": "current", "volt": "voltage", "acc": "acceleration",
     "spd": "speed", "trq": "torque", "amb": "ambient", "act": "actual",
+    "setpoint": "reference", "target": "reference", "demand": "command", "amps": "current", "volts": "voltage",
+}  # fmt: skip
+#: German words of a bench, also as parts of longer ones (Solldrehzahl), and what they mean.
+_GERMAN = {
+    "soll": "command", "ist": "actual", "sollwert": "command", "istwert": "actual", "vorgabe": "command",
+    "drehzahl": "speed", "winkelgeschwindigkeit": "speed", "geschwindigkeit": "velocity", "weg": "position",
+    "position": "position", "lage": "position", "winkel": "angle", "strom": "current", "spannung": "voltage",
+    "temperatur": "temperature", "kraft": "force", "drehmoment": "torque", "moment": "torque", "last": "load",
+    "druck": "pressure", "beschleunigung": "acceleration", "umgebung": "ambient", "motor": "motor",
+    "leistung": "power", "antrieb": "drive", "getriebe": "gearbox", "spindel": "screw", "mutter": "nut",
 }  # fmt: skip
 _SURE, _LIKELY = 0.5, 0.2
 _UNIT = 0.35
@@ -88,6 +98,8 @@ def _units_agree(variable: Variable, column: FoundColumn) -> bool | None:
 
 def _likeness(variable: Variable, column: FoundColumn) -> float:
     name, plain = variable.name.rpartition(".")[2].lower(), "".join(column.words).lower()
+    if _letters(column.plain) in (_letters(variable.name), _letters(name)):
+        return 2.0 if _letters(column.plain) == _letters(variable.name) else 1.9
     if plain in (name, name.replace("_", "")):
         return 1.5
     own = _meaning(column.words)
@@ -96,9 +108,26 @@ def _likeness(variable: Variable, column: FoundColumn) -> float:
     return max(0.8 * letters if letters >= 0.75 else 0.0, *(_dice(own, _meaning(text)) for text in texts))
 
 
+def _letters(name: str) -> str:
+    """A name without what separates its words."""
+    return "".join(c for c in name.lower() if c.isalnum())
+
+
+def _english(word: str) -> list[str]:
+    """A word, or the meanings of the German words that it is made of; a part that is none stays as it is."""
+    if word in _GERMAN:
+        return [_GERMAN[word]]
+    for part in sorted(_GERMAN, key=len, reverse=True):
+        if len(part) > 2 and word.startswith(part):
+            return [_GERMAN[part], *(_english(word[len(part) :].removeprefix("s")) if word != part else [])]
+        if len(part) > 3 and word.endswith(part):
+            return [*_english(word[: -len(part)]), _GERMAN[part]]
+    return [word]
+
+
 def _meaning(found: Sequence[str]) -> set[str]:
-    """The words that mean something, abbreviations spelt out, single letters left out."""
-    plain = {_SHORT.get(word.lower(), word.lower()) for word in found}
+    """The words that mean something, in English, abbreviations spelt out, single letters left out."""
+    plain = {e for word in found for e in _english(_SHORT.get(word.lower(), word.lower()))}
     return {word for word in plain if len(word) > 1 and word not in _EMPTY_WORDS}
 
 

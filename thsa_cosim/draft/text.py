@@ -4,13 +4,13 @@ import json
 import math
 import os
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from thsa_cosim.draft.match import Match, match_columns
 from thsa_cosim.fmu import FmuDescription, Variable
-from thsa_cosim.recordings.columns import FoundColumn, find_columns, time_column
+from thsa_cosim.recordings.columns import FoundColumn, find_columns, time_column, unused_columns
 from thsa_cosim.units import same_dimension
 
 _MOST_PARAMETERS = 60
@@ -21,7 +21,8 @@ _MOST_PARAMETERS = 60
 class Draft:
     """The ``text`` of a scenario, and what it rests on.
 
-    ``matches``: what is driven and compared. ``constant``: inputs without a column.
+    ``matches``: what is driven and compared. ``constant``: inputs without a column. ``unused``: why a column of the
+    file holds no usable numbers.
     """
 
     text: str
@@ -29,6 +30,15 @@ class Draft:
     constant: tuple[Variable, ...]
     unmatched_columns: tuple[FoundColumn, ...]
     unmatched_outputs: tuple[Variable, ...]
+    unused: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def undriven(self) -> tuple[Variable, ...]:
+        """Inputs that command or load the model, but have no column, or one that never changes."""
+        still = tuple(
+            m.variable for m in self.matches if m.variable.causality == "input" and m.column.constant
+        )
+        return tuple(v for v in (*self.constant, *still) if not _is_temperature(v) and not _is_load(v))
 
 
 def draft_scenario(fmu: FmuDescription, recordings: Sequence[Path], target: Path) -> Draft:
@@ -46,11 +56,16 @@ def draft_scenario(fmu: FmuDescription, recordings: Sequence[Path], target: Path
     RecordingError
         If the first recording cannot be read, or holds no column of numbers.
     """
-    return draft_from_columns(fmu, find_columns(recordings[0]), recordings, target)
+    found = find_columns(recordings[0])
+    return draft_from_columns(fmu, found, recordings, target, unused_columns(recordings[0], found))
 
 
 def draft_from_columns(
-    fmu: FmuDescription, columns: Sequence[FoundColumn], recordings: Sequence[Path], target: Path
+    fmu: FmuDescription,
+    columns: Sequence[FoundColumn],
+    recordings: Sequence[Path],
+    target: Path,
+    unused: Mapping[str, str] | None = None,
 ) -> Draft:
     """Draft as :func:`draft_scenario`, from columns that were found."""
     columns = [column for column in columns if _is_name(column.name)]
@@ -70,14 +85,14 @@ def draft_from_columns(
         _time(time),
         *(_signal(match, match is temperature) for match in matches),
         *(_constant(variable) for variable in constant),
-        _left_out(unmatched_columns, unmatched_outputs),
+        _left_out(unmatched_columns, unmatched_outputs, unused or {}),
         _temperature(temperature),
         _fixed(fmu),
         _simulation(fmu),
         _identify(fmu),
     ]
     text = "\n".join(part for part in parts if part)
-    return Draft(text, matches, constant, unmatched_columns, unmatched_outputs)
+    return Draft(text, matches, constant, unmatched_columns, unmatched_outputs, unused or {})
 
 
 def _head(fmu: FmuDescription, recordings: Sequence[Path], target: Path) -> str:
@@ -119,6 +134,9 @@ def _signal(match: Match, is_temperature: bool) -> str:
         lines.append(f"unit = {_quoted(variable.unit)}  # assumed: the FMU's; the file does not say")
     if is_temperature:
         lines.append('smooth = "mean"')
+    elif variable.causality == "input" and column.silent:
+        lines.append('interpolation = "hold"  # it has no noise: a command that stays until the next sample')
+        return "\n".join(lines) + "\n"
     elif variable.causality == "input" and column.noise > 0.0:
         noise = f"{column.noise:.2g} {column.unit or ''}".rstrip()
         lines.append(f'# smooth = "piecewise-linear"  # plateaus and ramps below its noise of about {noise}')
@@ -142,8 +160,11 @@ def _constant(variable: Variable) -> str:
     )
 
 
-def _left_out(columns: Sequence[FoundColumn], outputs: Sequence[Variable]) -> str:
+def _left_out(columns: Sequence[FoundColumn], outputs: Sequence[Variable], unused: Mapping[str, str]) -> str:
     lines = []
+    if unused:
+        lines.append("# Columns that cannot be used:")
+        lines += [f"#   {_plain(name)}: {_plain(reason)}" for name, reason in unused.items()]
     if columns:
         lines.append("# Columns that no variable fits:")
         lines += [f"#   {_plain(c.name)}{f' [{_plain(c.unit)}]' if c.unit else ''}" for c in columns]
@@ -211,6 +232,11 @@ def _identify(fmu: FmuDescription) -> str:
 def _is_name(name: str) -> bool:
     """Whether a scenario can hold the name."""
     return re.fullmatch(r"[^\x00-\x1f\x7f]+", name) is not None
+
+
+def _is_load(variable: Variable) -> bool:
+    """Whether a variable is a force or torque, which may well be none."""
+    return bool(variable.unit) and any(same_dimension(str(variable.unit), u) for u in ("N", "N.m"))
 
 
 def _is_temperature(variable: Variable) -> bool:

@@ -1,12 +1,19 @@
-"""C sources → shared libraries for every platform, by ``ziglang`` (a C compiler in a wheel)."""
+"""C sources → shared libraries for every platform, by ``ziglang`` (a C compiler in a wheel).
 
+What was compiled is kept by the digest of sources, flags, target and compiler, so that one study leaves it to the next.
+"""
+
+import contextlib
+import hashlib
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from platform import machine as machine_name
 
 from thsa_cosim.errors import MissingExtraError, ThsaCosimError
 
@@ -28,6 +35,18 @@ PLATFORMS = (
     Platform(None, "aarch64-darwin", "aarch64-macos", ".dylib"),
     Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
 )
+
+
+def native_platform() -> Platform:
+    """The platform that this process runs on; ThsaCosimError if nothing can be built for it."""
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine_name().lower(), machine_name().lower())
+    system = {"linux": "linux", "darwin": "darwin", "win32": "windows"}.get(sys.platform, sys.platform)
+    for platform in PLATFORMS:
+        if platform.fmi3 == f"{machine}-{system}":
+            return platform
+    raise ThsaCosimError(f"FMUs cannot be built for {machine}-{system}.")
+
+
 FLAGS = (
     "-std=c99",
     "-O2",
@@ -40,12 +59,22 @@ FLAGS = (
 )
 
 
+#: Libraries that are kept; the oldest go first.
+KEPT = 64
+
+
+def this_platform() -> tuple[str, ...] | None:
+    """What to compile for to run here, as FMI 2.0 names it; None (all) on a machine that is not known."""
+    here = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}.get(sys.platform)
+    return (here,) if here else None
+
+
 def compile_library(folder: Path, sources: Sequence[str], platform: Platform, output: Path) -> None:
-    """Compile ``sources`` of ``folder`` to a shared library for ``platform``.
+    """Compile ``sources`` of ``folder`` to a shared library for ``platform``, unless it was compiled before.
 
     Raises MissingExtraError without ziglang and ThsaCosimError with the compiler's first line when it fails.
     """
-    compiler_version()
+    version = compiler_version()
     flags = [flag for flag in FLAGS if not (flag == "-fPIC" and platform.suffix == ".dll")]
     command = [
         sys.executable,
@@ -62,6 +91,12 @@ def compile_library(folder: Path, sources: Sequence[str], platform: Platform, ou
     ]
     if platform.suffix == ".so":
         command.append("-lm")
+    kept = _kept(folder, [version, platform.target, *flags, *sources], platform.suffix)
+    if kept is not None and kept.is_file():
+        with contextlib.suppress(OSError):
+            shutil.copyfile(kept, output)
+            kept.touch()
+            return
     done = subprocess.run(
         command, cwd=folder, capture_output=True, text=True, env={**os.environ, "ZIG_PROGRESS": "0"}
     )
@@ -72,6 +107,35 @@ def compile_library(folder: Path, sources: Sequence[str], platform: Platform, ou
             or ["no message"]
         )
         raise ThsaCosimError(f"The C compiler failed for {platform.target}: {lines[0]}")
+    if kept is not None:
+        _keep(output, kept)
+
+
+def _kept(folder: Path, options: Sequence[str], suffix: str) -> Path | None:
+    """Where the library of these files and options is kept; None where nothing can be kept."""
+    digest = hashlib.sha256("\0".join(options).encode())
+    for file in sorted(folder.glob("*.[ch]")):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    root = os.environ.get("THSA_COSIM_CACHE")
+    if root is None:
+        home = os.environ.get("LOCALAPPDATA" if sys.platform == "win32" else "XDG_CACHE_HOME")
+        try:
+            root = str((Path(home) if home else Path.home() / ".cache") / "thsa-cosim")
+        except RuntimeError:  # no home
+            return None
+    return Path(root) / "libraries" / f"{digest.hexdigest()}{suffix}" if root else None
+
+
+def _keep(library: Path, kept: Path) -> None:
+    """Keep a library, whole or not at all, and forget the oldest ones; a cache that cannot be written is none."""
+    with contextlib.suppress(OSError):
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        partial = kept.with_name(f"{kept.name}.{os.getpid()}.part")
+        shutil.copyfile(library, partial)
+        partial.replace(kept)
+        known = sorted(kept.parent.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+        for path in known[KEPT:]:
+            path.unlink(missing_ok=True)
 
 
 def compiler_version() -> str:

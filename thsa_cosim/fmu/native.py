@@ -17,6 +17,10 @@ _STATUS_NAMES = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 _STATUS_OF_CODE = {2: Status.FMI_DISCARD, 4: Status.FMI_FATAL}
 
 
+LIBRARY_SUFFIX = {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
+"""Ending of shared libraries here."""
+
+
 def platform_folders(fmi_version: str) -> tuple[str, ...]:
     """Folders under ``binaries/`` that fit this machine (FMI 1 and 2: linux64; FMI 3: x86_64-linux)."""
     machine = os.uname().machine if hasattr(os, "uname") else "x86_64"
@@ -29,7 +33,7 @@ def platform_folders(fmi_version: str) -> tuple[str, ...]:
 
 def library_path(folder: Path, description: FmuDescription, identifier: str) -> Path:
     """Return the shared library for this machine; SimulationFailure names what the archive has instead."""
-    extension = {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
+    extension = LIBRARY_SUFFIX
     folders = platform_folders(description.fmi_version)
     for name in folders:
         candidate = folder / "binaries" / name / (identifier + extension)

@@ -12,12 +12,11 @@ import numpy as np
 
 from thsa_cosim.fmu.archive import open_archive
 from thsa_cosim.fmu.description import FmuDescription, Variable
-from thsa_cosim.fmu.inputs import input_mode
-from thsa_cosim.fmu.native import platform_folders
+from thsa_cosim.fmu.native import LIBRARY_SUFFIX, platform_folders
 from thsa_cosim.signals import FloatArray, Signals
 
 _STEPS = 2000
-"""Communication steps of a trial at most; a longer default experiment is cut short."""
+"""Communication steps of a trial at most; a longer default experiment takes a multiple of its step."""
 _OUTPUTS = 200
 """Variables compared at most."""
 
@@ -96,31 +95,47 @@ def validation_messages(path: Path) -> tuple[str, ...]:
 def missing_binary(description: FmuDescription) -> str:
     """Return why this machine cannot load the FMU, or an empty string."""
     wanted = platform_folders(description.fmi_version)
+    identifiers = {description.co_simulation_identifier, description.model_exchange_identifier} - {None}
     with open_archive(description.path) as archive:
-        folders = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
-        has_sources = any(name.startswith("sources/") for name in archive.namelist())
-    if folders & set(wanted):
+        names = [name for name in archive.namelist() if not name.endswith("/")]
+    files = [name.split("/") for name in names if name.startswith("binaries/") and name.count("/") >= 2]
+    folders = sorted({parts[1] for parts in files})
+    here = [f"{identifier}{LIBRARY_SUFFIX}" for identifier in sorted(identifiers, key=str)]
+    if all(any(parts[1] in wanted and parts[2:] == [file] for parts in files) for file in here):
         return ""
-    remedy = (
-        "it has C sources: build it with `fmpy compile`" if has_sources else "export it for this platform"
-    )
-    return f"no binary for {wanted[0]} (it has {', '.join(sorted(folders)) or 'none'}); {remedy}"
+    remedy = "export it for this platform"
+    if any(name.startswith("sources/") for name in names):
+        remedy = "it has C sources: `thsa-cosim check --compile OUT.fmu` builds them"
+    if set(folders) & set(wanted):
+        return f"binaries/{wanted[0]} does not hold {' and '.join(here)}; {remedy}"
+    return f"no library for {wanted[0]} (it has {', '.join(folders) or 'none at all'}); {remedy}"
 
 
-def input_handling(description: FmuDescription) -> str:
-    """Return how inputs that change within a communication step reach this FMU in Co-Simulation."""
-    linear = [v for v in description.inputs if v.is_float and v.variability == "continuous"]
-    return input_mode(description, linear)
+def trial_time(
+    description: FmuDescription,
+    *,
+    duration: float | None = None,
+    step: float | None = None,
+    cut: bool = False,
+) -> FloatArray:
+    """Return the communication points of a trial, (n,) s: the default experiment up to its stop time.
 
-
-def trial_time(description: FmuDescription) -> FloatArray:
-    """Return the communication points of a trial, (n,) s: the default experiment, at most 2000 steps."""
+    ``duration`` and ``step`` [s] replace what the FMU declares. More than 2000 steps of the declared size become
+    fewer ones of a multiple of it, unless they are ``cut`` short; a ``step`` that is given is kept.
+    """
     default = description.default_experiment
     start = default.start or 0.0
     stop = default.stop if default.stop is not None and default.stop > start else start + 1.0
-    step = default.step if default.step and default.step > 0.0 else (stop - start) / 500.0
-    count = int(np.clip(np.round((stop - start) / step), 1, _STEPS))
-    return np.asarray(start + step * np.arange(count + 1), dtype=np.float64)
+    span = duration or stop - start
+    size = step or (default.step if default.step and default.step > 0.0 else span / 500.0)
+    count = max(int(np.round(span / size)), 1)
+    if step is None and count > _STEPS:
+        if cut:
+            count = _STEPS
+        else:
+            size *= int(np.ceil(count / _STEPS))
+            count = max(int(np.round(span / size)), 1)
+    return np.asarray(start + size * np.arange(count + 1), dtype=np.float64)
 
 
 def halved(time: FloatArray) -> FloatArray:
@@ -157,6 +172,49 @@ def raised_inputs(description: FmuDescription, time: FloatArray) -> Signals | No
     return Signals(time, values) if values else None
 
 
+_KNOTS = (
+    np.array([0.0, 0.08, 0.3, 0.45, 0.6, 0.7, 1.0]),
+    np.array([0.0, 0.0, 1.0, 1.0, 0.3, 0.6, 0.6]),
+)
+"""A course with kinks, from 0 to 1, that comes to rest."""
+
+
+def excitable(description: FmuDescription) -> tuple[Variable, ...]:
+    """Inputs that can run linearly."""
+    return tuple(
+        v for v in description.inputs if v.is_float and not v.is_array and v.variability == "continuous"
+    )
+
+
+def kinked_inputs(
+    description: FmuDescription,
+    time: FloatArray,
+    *,
+    ends: Mapping[str, float] | None = None,
+    times: float = 1.0,
+    only: str | None = None,
+) -> Signals | None:
+    """Return inputs that run with kinks from their start values, each with a shift of its own; None if none can.
+
+    ``ends``: value that an input runs to, by name; otherwise a tenth of its range or of its start value, or its
+    nominal value. ``times`` scales what nobody declared. ``only`` moves that input alone.
+    """
+    variables = excitable(description)
+    values = {}
+    for k, v in enumerate(variables):
+        share = (time - time[0]) / (time[-1] - time[0])
+        course = np.interp(share - 0.04 * (k % 5), *_KNOTS)
+        start = v.start or 0.0
+        size = (ends or {}).get(v.name, start + _amplitude(v) * (times if is_undeclared(v) else 1.0)) - start
+        values[v.name] = start + size * (course if only in (None, v.name) else 0.0 * course)
+    return Signals(time, values) if values else None
+
+
+def is_undeclared(variable: Variable) -> bool:
+    """Whether nothing says how large an input is."""
+    return variable.nominal is None and variable.minimum is None and variable.maximum is None
+
+
 def _amplitude(variable: Variable) -> float:
     start = variable.start or 0.0
     if variable.nominal is not None:
@@ -170,13 +228,17 @@ def _amplitude(variable: Variable) -> float:
     return size
 
 
-def changed_parameters(description: FmuDescription) -> dict[str, float]:
-    """Return start values 1 % off for floating-point parameters that are not 0, within their bounds."""
+def changed_parameters(description: FmuDescription, *, zeros: bool = False) -> dict[str, float]:
+    """Return start values 1 % off for floating-point parameters, within their bounds.
+
+    Those that are 0 are left out, or with ``zeros`` come out a little off 0.
+    """
     changed = {}
     for v in description.parameters:
-        if not v.is_float or v.is_array or not v.start:
+        if not v.is_float or v.is_array or v.start is None or not (v.start or zeros):
             continue
-        for value in (v.start * 1.01, v.start * 0.99):
+        size = 0.01 * v.start or 1e-3 * (v.nominal or 1.0)
+        for value in (v.start + size, v.start - size):
             above = v.minimum is None or value >= v.minimum
             if above and (v.maximum is None or value <= v.maximum):
                 changed[v.name] = value

@@ -20,7 +20,6 @@ from thsa_cosim.identify.results import (
     IdentifyResult,
     LawResult,
     PointResult,
-    Progress,
 )
 from thsa_cosim.identify.run import identify
 
@@ -32,7 +31,6 @@ __all__ = [
     "IdentifyResult",
     "LawResult",
     "PointResult",
-    "Progress",
     "force_balance",
     "identify",
 ]

@@ -17,10 +17,10 @@ from thsa_cosim.batch import Experiment, Job, Journal, JournalRow, Outcome, Runn
 from thsa_cosim.costs.channels import ResidualReducer, TermsReducer
 from thsa_cosim.costs.identification import error_terms
 from thsa_cosim.identify.problem import Case, PointProblem
-from thsa_cosim.identify.results import Progress
 from thsa_cosim.scenario import SearchSpec
 from thsa_cosim.search import LocalSettings
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.study import OnProgress, Progress
 
 #: Seconds between two writes to the journal: what a power cut may cost.
 WRITE_EVERY = 1.0
@@ -118,7 +118,7 @@ class Evaluator:
         points: Sequence[PointProblem],
         names: Sequence[str],
         channels: Sequence[str],
-        on_progress: Callable[[Progress], None] | None = None,
+        on_progress: OnProgress | None = None,
     ) -> None:
         self._failed: Counter[tuple[str, str]] = Counter()
         self.evaluations: list[int] = [0] * len(points)

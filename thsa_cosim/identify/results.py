@@ -150,20 +150,3 @@ class IdentifyResult:
     """What is to be known about the recordings."""
     trust: Trust = field(default_factory=lambda: Trust("explained"))
     """Whether the fit leaves nothing but noise."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a study is; ``planned`` shrinks when a search converges early.
-
-    ``runs`` counts simulations (evaluated vector × recording), ``reused`` those taken from the journal.
-    ``best``: lowest cost per sample so far, by point.
-    """
-
-    stage: str
-    runs: int
-    planned: int
-    reused: int
-    failures: int
-    best: Mapping[str, float]
-    generation: int

@@ -4,7 +4,6 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
-from pathlib import Path
 
 from thsa_cosim import __version__
 from thsa_cosim.batch import Experiment, Job, Journal, Runner
@@ -23,35 +22,28 @@ from thsa_cosim.identify.results import (
     IdentifyResult,
     LawResult,
     PointResult,
-    Progress,
 )
 from thsa_cosim.identify.silent import note_on, silent_parameters
 from thsa_cosim.inspection import Residual, judge
 from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario import Scenario, open_runner
+from thsa_cosim.scenario import Scenario
 from thsa_cosim.search import EvolutionSettings, Generation
-from thsa_cosim.study import describe, open_study, study_identity
+from thsa_cosim.study import Place, Study, describe, study_identity
 
 JOURNAL = "journal.csv"
-OnProgress = Callable[[Progress], None]
 
 
 def identify(
     scenario: Scenario,
+    place: Place,
     *,
-    folder: Path,
-    workers: int = 1,
-    cluster: str | None = None,
-    on_progress: OnProgress | None = None,
     given: Mapping[float | None, Given] | None = None,
-    command: str = "",
 ) -> IdentifyResult:
-    """Identify the scenario's parameters in the study folder ``folder``; continue what it holds.
+    """Identify the scenario's parameters in the study folder of ``place``; continue what it holds.
 
     A KeyboardInterrupt ends the study early: the result then has the status "interrupted" and the points
     that were finished. The same call continues it, and ends with what an undisturbed run would have found.
     ``given``: per temperature, how sure the start values are that earlier stages found; it widens the errors.
-    ``command``: the command line that repeats the study, to be kept with it.
 
     Raises
     ------
@@ -64,30 +56,32 @@ def identify(
     points = [build_point(scenario, p, known.get(p.temperature_degC)) for p in scenario.points]
     held_out = _held_out_cases(scenario)
     samples = {point.label: point.samples for point in points}
-    open_study(
-        folder, study_identity(scenario, "identify"), {**describe(scenario, command), "samples": samples}
-    )
+    about = {**describe(scenario), "samples": samples}
     names = tuple(dict.fromkeys(name for point in points for name in point.space.names))
     channels = points[0].channel_names
-    study = _Study(scenario, points, held_out)
-    with Journal.open(folder / JOURNAL, names, channels) as journal:
+    search = _Search(scenario, points, held_out)
+    with (
+        Study.open(place, study_identity(scenario, "identify"), about) as study,
+        Journal.open(place.folder / JOURNAL, names, channels) as journal,
+    ):
         try:
             experiments = _experiments(points, held_out)
-            with open_runner(scenario.simulation, experiments, workers, cluster) as runner:
-                study.note(runner.notes)
-                evaluator = Evaluator(runner, journal, points, names, channels, on_progress)
-                study.try_parameters(evaluator)
-                study.search(evaluator)
-                study.validate(runner)
+            with study.open_runner(scenario.simulation, experiments) as runner:
+                search.note(runner.notes)
+                evaluator = Evaluator(runner, journal, points, names, channels, place.on_progress)
+                search.try_parameters(evaluator)
+                search.search(evaluator)
+                search.validate(runner)
+            study.complete()
         except KeyboardInterrupt:
-            study.interrupted = True
-    return study.result()
+            search.interrupted = True
+    return search.result()
 
 
 _log = logging.getLogger(__name__)
 
 
-class _Study:
+class _Search:
     """What has been found so far."""
 
     def __init__(

@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from thsa_cosim.fmu.description import read_description
 from thsa_cosim.fmu.inputs import is_ours
 from thsa_cosim.identify.evaluate import Reply, Request, Want
 from thsa_cosim.identify.problem import PointProblem
 from thsa_cosim.signals import Signals
+from thsa_cosim.system import read_description
 
 _CHANGE = 0.3
 """Of the way between the bounds."""

@@ -39,7 +39,8 @@ def inspect(recordings: Sequence[Recording], inputs: Collection[str]) -> Inspect
     findings: list[Finding] = []
     for recording in recordings:
         channels = [_channel(recording, name, name in inputs) for name in recording.samples]
-        times = _different([s.time for s in recording.samples.values()])
+        fast = [s.time for s in recording.samples.values() if not s.averaged]
+        times = _different(fast or [s.time for s in recording.samples.values()])
         findings += inspect_channels(recording.name, channels, times)
         if recording.lead_in > 0.0:
             findings = [f for f in findings if (f.recording, f.kind) != (recording.name, "moving-start")]

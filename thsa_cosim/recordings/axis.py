@@ -1,15 +1,16 @@
 """The time axis of a recording: read, checked, cut, resampled; and the units and samples it must have."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from thsa_cosim.errors import RecordingError, UnitError
 from thsa_cosim.recordings.table import RawColumn
 from thsa_cosim.signals import FloatArray
-from thsa_cosim.units import conversion, convert
+from thsa_cosim.units import conversion, convert, same_dimension
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,8 @@ class TimeAxis:
 
     ``column`` None takes the file's own time axis (TDMS waveforms, MF4). ``start`` and ``stop`` [s] cut in the
     file's time; the cut begins ``lead_in`` s earlier as far as the file goes. The first kept sample becomes time 0
-    if ``from_zero``. ``step`` [s] resamples linearly.
+    if ``from_zero``. ``step`` [s] resamples linearly. ``repeated``: what becomes of rows whose stamp repeats or goes
+    back.
     """
 
     column: str | None = None
@@ -28,6 +30,19 @@ class TimeAxis:
     step: float | None = None
     from_zero: bool = True
     lead_in: float = 0.0
+    repeated: Literal["refuse", "drop"] = "refuse"
+
+
+def without_repeats(raw: Mapping[str, RawColumn], axis: TimeAxis) -> tuple[dict[str, RawColumn], int]:
+    """Return the columns without the rows whose stamp does not lie after all before, and how many those were."""
+    stamps = raw[axis.column].values if axis.column is not None else np.empty(0)
+    if axis.repeated == "refuse" or stamps.size == 0:
+        return dict(raw), 0
+    latest = np.maximum.accumulate(np.where(np.isfinite(stamps), stamps, -np.inf))
+    kept = np.concatenate(([True], stamps[1:] > latest[:-1]))
+    same = {n: c for n, c in raw.items() if c.values.size == stamps.size}
+    dropped = {n: replace(c, values=c.values[kept]) for n, c in same.items()}
+    return {**raw, **dropped}, int(np.sum(~kept))
 
 
 def times(path: Path, asked: str, raw: Mapping[str, RawColumn], axis: TimeAxis) -> FloatArray:
@@ -63,7 +78,7 @@ def times(path: Path, asked: str, raw: Mapping[str, RawColumn], axis: TimeAxis) 
         k = int(back[0])
         raise RecordingError(
             f"{path}: {label} does not increase at sample {k + 2} ({seconds[k + 1]:g} s after {seconds[k]:g} s);"
-            f" sort the rows and drop repeated ones."
+            f' sort the rows, or drop repeated ones with recordings.time.repeated = "drop".'
         )
     return seconds
 
@@ -106,6 +121,11 @@ def check_finite(path: Path, asked: str, values: FloatArray, time: FloatArray, k
         )
 
 
+def _open_speed(unit: str) -> bool:
+    """Whether a unit is one per time that does not say what it counts."""
+    return same_dimension(unit, "Hz") and not same_dimension(unit, "rad/s")
+
+
 def source_unit(path: Path, asked: str, given: str | None, stated: str | None, key: str) -> str:
     """Return the unit of the file's numbers: the scenario's, else the file's; they may not differ."""
     if given is None:
@@ -129,7 +149,8 @@ def source_unit(path: Path, asked: str, given: str | None, stated: str | None, k
             conversion(stated, stated)
         except UnitError:
             return given  # the file's unit is no unit ("counts/div"): the scenario knows better
-        same = False
+        # Turns or radians: the file does not say ("Hz", "1/s"), the scenario does.
+        same = _open_speed(stated) and same_dimension(given, "rad/s")
     if not same:
         raise UnitError(
             f"{path}: column {asked!r} is in {stated!r} by the file, but {key}.unit says {given!r};"

@@ -33,7 +33,8 @@ _NUMBER = {
     mark: re.compile(rf"[+-]?(\d+({re.escape(mark)}\d*)?|{re.escape(mark)}\d+)([eE][+-]?\d+)?")
     for mark in ".,"
 }
-_STAMP = re.compile(r"\d{4}-\d\d-\d\d([ T]\d\d:\d\d.*)?|\d+:\d\d:\d\d.*")
+_STAMP = re.compile(r"(\d{4}-\d\d-\d\d|\d{1,2}[./]\d{1,2}[./]\d{2,4})([ T]+\d{1,2}:\d\d.*)?|\d+:\d\d:\d\d.*")
+_DAY = re.compile(r"(\d{1,2})[./](\d{1,2})[./](\d{4}|\d\d)(?:[ T]+(.*))?")
 
 
 class _Dialect(NamedTuple):
@@ -288,7 +289,41 @@ def _column(cells: Sequence[str], numbers: Sequence[int], decimal: str) -> RawCo
 
 
 def _stamps(cells: Sequence[str]) -> RawColumn:
+    if _DAY.fullmatch(cells[0]):
+        return _dated(cells)
     if "-" in cells[0]:
-        return numeric(np.array([cell.removesuffix("Z") for cell in cells], dtype="datetime64[ns]"))
-    clock = np.array([[float(part.replace(",", ".")) for part in cell.split(":")] for cell in cells])
-    return RawColumn(np.asarray(clock @ np.array([3600.0, 60.0, 1.0]), dtype=np.float64), unit="s")
+        plain = [cell.removesuffix("Z").replace(",", ".") for cell in cells]
+        return numeric(np.array(plain, dtype="datetime64[ns]"))
+    return RawColumn(_past_midnight(_clock(cells)), unit="s")
+
+
+def _clock(cells: Sequence[str]) -> FloatArray:
+    """Seconds of the day of texts such as 09:41:22,000; without seconds, they are 0."""
+    parts = [[float(part.replace(",", ".")) for part in cell.split(":")] for cell in cells]
+    clock = np.array([[*row, 0.0, 0.0][:3] for row in parts])
+    return np.asarray(clock @ np.array([3600.0, 60.0, 1.0]), dtype=np.float64)
+
+
+def _past_midnight(seconds: FloatArray) -> FloatArray:
+    """Add a day where the clock starts again."""
+    return np.asarray(seconds + 86400.0 * np.concatenate(([0], np.cumsum(np.diff(seconds) < -43200.0))))
+
+
+def _dated(cells: Sequence[str]) -> RawColumn:
+    """Seconds since the first of dates such as 17.03.2026 09:41:22,000; the day comes first unless it cannot."""
+    found = [_DAY.fullmatch(cell) for cell in cells]
+    if not all(found):
+        raise ValueError("not all of them are dates")
+    rows = [m.groups() for m in found if m]
+    first, second = (np.array([int(row[k]) for row in rows]) for k in (0, 1))
+    months_first = second.max() > 12
+    day, month = (second, first) if months_first else (first, second)
+    if months_first or first.max() > 12 or "." in cells[0] or (np.ptp(first) == 0 and np.ptp(second) == 0):
+        years = [int(row[2]) + (2000 if len(row[2]) == 2 else 0) for row in rows]
+        texts = [f"{y:04d}-{m:02d}-{d:02d}" for y, m, d in zip(years, month, day, strict=True)]
+        days = np.array(texts, dtype="datetime64[D]").astype(np.int64)
+        seconds = _clock([row[3] or "0:00:00" for row in rows]) + 86400.0 * (days - days[0])
+        return RawColumn(np.asarray(seconds - seconds[0], dtype=np.float64), unit="s")
+    return RawColumn(
+        problem=f"does not say which is the day and which the month: {cells[0]!r}; write 2026-03-17"
+    )

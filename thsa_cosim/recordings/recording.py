@@ -2,20 +2,28 @@
 
 import hashlib
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thsa_cosim.errors import RecordingError, ThsaCosimError, UnitError, did_you_mean, did_you_mean_path
-from thsa_cosim.recordings.axis import TimeAxis, check_finite, common_grid, source_unit, times
+from thsa_cosim.recordings.axis import (
+    TimeAxis,
+    check_finite,
+    common_grid,
+    source_unit,
+    times,
+    without_repeats,
+)
 from thsa_cosim.recordings.noise import noise_estimate
 from thsa_cosim.recordings.outliers import Mask
 from thsa_cosim.recordings.piecewise import fit_piecewise_linear
 from thsa_cosim.recordings.repair import Repair, coded, repaired
-from thsa_cosim.recordings.table import Choose, RawColumn, resolve
+from thsa_cosim.recordings.table import Choose, RawColumn, resolve, sparse_rows
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.units import convert
 
@@ -55,6 +63,8 @@ class Column:
         command does.
     repair
         Samples that do not count.
+    time
+        Name of a time column of its own; None: the recording's.
     """
 
     column: str | None = None
@@ -67,6 +77,7 @@ class Column:
     noise: float | None = None
     interpolation: Literal["linear", "hold"] = "linear"
     repair: Repair = field(default_factory=Repair)
+    time: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,9 +195,11 @@ def read_recording(
     if isinstance(temperature, Column):
         sources[_TEMPERATURE] = temperature
     raw, sha256 = _load_chosen(path, sources, axis)
+    raw, dropped = without_repeats(raw, axis)
     targets: dict[str, str | None] = {**(units or {}), _TEMPERATURE: "degC"}
-    own = {s.column: times(path, s.column, raw, axis) for s in sources.values() if s.column is not None}
-    grid = common_grid(path, own, axis)
+    own, thin = _own_times(path, raw, sources, axis)
+    # A slow column is held beyond its last sample; it does not cut the fast ones.
+    grid = common_grid(path, {k: t for k, t in own.items() if k not in thin} or own, axis)
     if axis.lead_in >= grid[-1] - grid[0]:
         raise RecordingError(
             f"{path}: a lead-in of {axis.lead_in:g} s leaves nothing of {grid[-1] - grid[0]:g} s to compare;"
@@ -197,7 +210,7 @@ def read_recording(
     notes: list[str] = []
     samples: dict[str, Samples] = {}
     left_out: dict[str, Mask] = {}
-    repairs: list[str] = []
+    repairs = [f"time: {dropped} rows dropped whose stamp repeats or goes back"] if dropped else []
     for signal, source in sources.items():
         if source.column is None:
             unit = source.unit or targets.get(signal) or "1"
@@ -206,8 +219,15 @@ def read_recording(
             )
             values[signal], noise[signal] = np.full(grid.shape, constant[0]), 0.0
             continue
-        column, t = raw[source.column], own[source.column]
+        column, t = raw[source.column], own[signal]
+        if signal in thin:
+            column = replace(column, values=column.values[thin[signal]])
+            notes.append(
+                f"{path}: {source.column!r} has a value in one row of {_every(thin[signal])}: read so."
+            )
         kept = (t >= grid[0]) & (t <= grid[-1])
+        if signal in thin and np.sum(kept) < 2:
+            kept = np.ones(t.shape, dtype=np.bool_)
         missing = coded(column.values, source.repair)
         check_finite(path, source.column, column.values, t, kept & ~missing)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -268,6 +288,41 @@ def read_recording(
 _TEMPERATURE = "\0temperature"
 
 
+def _own_times(
+    path: Path, raw: Mapping[str, RawColumn], sources: Mapping[str, Column], axis: TimeAxis
+) -> tuple[dict[str, FloatArray], dict[str, NDArray[np.intp]]]:
+    """Times [s] of each signal's samples, and the rows that hold them for signals of a lower rate than the table."""
+    own: dict[str, FloatArray] = {}
+    thin: dict[str, NDArray[np.intp]] = {}
+    for signal, source in sources.items():
+        if source.column is None:
+            continue
+        column, stamps = raw[source.column], axis.column if source.time is None else source.time
+        rows = sparse_rows(column.values) if source.repair.missing is None else None
+        if rows is None and source.time is not None and source.time in raw:
+            # Columns of another rate side by side: the shorter ones end in blank cells.
+            filled = np.isfinite(raw[source.time].values) & np.isfinite(column.values)
+            rows = None if filled.all() else np.flatnonzero(filled)
+        if rows is None:
+            own[signal] = times(path, source.column, raw, replace(axis, column=stamps))
+            continue
+        thin[signal] = rows
+        short = {source.column: _rows(column, rows)}
+        if stamps is not None:
+            short[stamps] = _rows(raw[stamps], rows)
+        own[signal] = times(path, source.column, short, replace(axis, column=stamps))
+    return own, thin
+
+
+def _rows(column: RawColumn, rows: NDArray[np.intp]) -> RawColumn:
+    time = None if column.time is None else column.time[rows]
+    return replace(column, values=column.values[rows], time=time)
+
+
+def _every(rows: NDArray[np.intp]) -> int:
+    return round(float(np.median(np.diff(rows))))
+
+
 def _on_grid(left_out: Mask, time: FloatArray, grid: FloatArray) -> Mask:
     """Which points of ``grid`` (m,) s rest on samples (n,) at ``time`` that are left out."""
     slack = 1e-6 * float(np.min(np.diff(time)))
@@ -282,6 +337,7 @@ def _load_chosen(
     """Load the columns that are asked for, under the names by which they are asked for."""
     wanted = [s.column for s in sources.values() if s.column is not None]
     wanted += [axis.column] if axis.column is not None else []
+    wanted += [s.time for s in sources.values() if s.time is not None]
     full: dict[str, str] = {}
 
     def choose(names: Sequence[str]) -> list[str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thsa_cosim.errors import RecordingError, did_you_mean
 from thsa_cosim.signals import FloatArray
@@ -80,6 +81,18 @@ def _without_unit(name: str) -> str:
 
 def _without_group(name: str) -> str:
     return split_unit(name)[0].rsplit("/", 1)[-1]
+
+
+def sparse_rows(values: FloatArray) -> NDArray[np.intp] | None:
+    """Return the rows that hold a number, if a column of a lower rate stands in a table: at most every second row,
+    evenly; None otherwise.
+    """
+    filled = np.flatnonzero(np.isfinite(values))
+    if not 2 <= filled.size <= values.size // 2 + 1 or filled.size == values.size:
+        return None
+    distances = np.diff(filled)
+    usual = float(np.median(distances))
+    return filled if usual >= 2.0 and distances.max() <= 1.5 * usual + 1.0 else None
 
 
 def numeric(values: object) -> RawColumn:

@@ -9,7 +9,7 @@ from rich.progress import BarColumn, TaskID, TextColumn
 from rich.progress import Progress as Bar
 
 if TYPE_CHECKING:
-    from thsa_cosim.identify.results import Progress
+    from thsa_cosim.study import Progress
 
 #: Seconds between two plain lines.
 LINE_EVERY = 10.0
@@ -25,14 +25,17 @@ def console(*, stderr: bool = False) -> Console:
 
 
 class ProgressDisplay:
-    """A context manager that is called with every ``Progress``; ``quiet`` shows nothing at all."""
+    """A context manager that is called with every ``Progress``; ``quiet`` shows nothing at all.
+
+    A step that begins is shown at once, with the seconds since the beginning; how far a search is now and then.
+    """
 
     def __init__(self, console: Console, *, quiet: bool = False) -> None:
         self._console = console
         self._quiet = quiet
         self._bar: Bar | None = None
         self._task: TaskID | None = None
-        self._begin = time.monotonic()
+        self._start = self._begin = time.monotonic()
         self._shown = self._begin
         self._last: Progress | None = None
 
@@ -59,6 +62,9 @@ class ProgressDisplay:
 
     def __call__(self, progress: "Progress") -> None:
         """Show ``progress``, unless something was shown a moment ago."""
+        if not progress.planned:
+            self._step(progress.stage)
+            return
         now = time.monotonic()
         if self._last is None or progress.stage != self._last.stage:
             self._begin = now  # rate and time left are those of the stage
@@ -76,6 +82,13 @@ class ProgressDisplay:
                 total=progress.planned,
                 state=self._state(progress),
             )
+
+    def _step(self, step: str) -> None:
+        text = f"{time.monotonic() - self._start:6.1f} s  {step}"
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, description=text, state="")
+        elif not self._quiet:
+            self._console.print(text, highlight=False, markup=False, soft_wrap=True)
 
     def _line(self, progress: "Progress") -> None:
         text = f"{progress.stage}: {self._state(progress)}"
@@ -105,32 +118,3 @@ def duration(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
     return f"{whole // 3600} h {whole % 3600 // 60} min"
-
-
-class StepDisplay:
-    """A context manager that is called with a sentence at every step: a spinner, or plain lines in a pipe."""
-
-    def __init__(self, console: Console, *, quiet: bool = False) -> None:
-        self._console = console
-        self._quiet = quiet
-        self._begin = time.monotonic()
-        self._status = None if quiet or not console.is_terminal else console.status("starting")
-
-    def __enter__(self) -> Self:
-        if self._status is not None:
-            self._status.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._status is not None:
-            self._status.stop()
-
-    def __call__(self, step: str) -> None:
-        """Show ``step`` with the seconds since the beginning."""
-        text = f"{time.monotonic() - self._begin:6.1f} s  {step}"
-        if self._status is not None:
-            self._status.update(text)
-        elif not self._quiet:
-            self._console.print(text, highlight=False, markup=False, soft_wrap=True)

@@ -3,11 +3,12 @@
 ``schema`` holds the file's tables (one pydantic class each, one class per kind), ``model`` the frozen objects
 that the use cases get, ``load`` turns the one into the other, ``check`` holds a scenario against its FMU and
 ``sentences`` turns a wrong key or value into one sentence; ``stages`` runs several scenarios in order,
-``runner`` opens the processes that ``[simulation]`` asks for.
+``executor`` opens the processes that ``[simulation]`` asks for.
 The ``tune_`` modules are the same for tunings, which need no recordings.
 """
 
-from thsa_cosim.scenario.load import load_scenario
+from thsa_cosim.scenario.executor import Executor, OpenRunner
+from thsa_cosim.scenario.loading import AnyScenario, load
 from thsa_cosim.scenario.model import (
     BalanceSpec,
     BlackBoxSpec,
@@ -21,33 +22,37 @@ from thsa_cosim.scenario.model import (
     SimulationSpec,
     TemperaturePoint,
 )
-from thsa_cosim.scenario.runner import open_runner
+from thsa_cosim.scenario.recorded import load_scenario
 from thsa_cosim.scenario.schema import KINDS
-from thsa_cosim.scenario.stages import Stage, StagedScenario, hand_on, load_study
+from thsa_cosim.scenario.source import Source
+from thsa_cosim.scenario.stages import Stage, StagedScenario, hand_on
 from thsa_cosim.scenario.table import Table
 from thsa_cosim.scenario.tune_load import load_tune
 from thsa_cosim.scenario.tune_model import TuneScenario
 
 __all__ = [
     "KINDS",
+    "AnyScenario",
     "BalanceSpec",
     "BlackBoxSpec",
     "Channel",
     "CostSpec",
     "DiagnoseSpec",
+    "Executor",
     "ForceSpec",
     "LawSpec",
+    "OpenRunner",
     "Scenario",
     "SearchSpec",
     "SimulationSpec",
+    "Source",
     "Stage",
     "StagedScenario",
     "Table",
     "TemperaturePoint",
     "TuneScenario",
     "hand_on",
+    "load",
     "load_scenario",
-    "load_study",
     "load_tune",
-    "open_runner",
 ]

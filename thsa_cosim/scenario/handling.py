@@ -8,10 +8,11 @@ import numpy as np
 from thsa_cosim.batch import Experiment
 from thsa_cosim.batch.handling import HandlingTrial, try_input_handling
 from thsa_cosim.errors import FmuError, ParameterError
-from thsa_cosim.fmu.description import FmuDescription, read_description
+from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.inputs import input_variables, is_linear, is_ours
 from thsa_cosim.fmu.plant import Kind
 from thsa_cosim.scenario.model import SimulationSpec
+from thsa_cosim.system import read_description
 
 WARN = 1e-3
 """A deviation over range, from half the step or Model Exchange, above which results are doubted."""

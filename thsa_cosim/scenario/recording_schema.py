@@ -38,6 +38,8 @@ class TimeTable(Table):
     """s; resample to this step."""
     from_zero: bool = True
     """The first kept sample becomes time 0."""
+    repeated: Literal["refuse", "drop"] = "refuse"
+    """``"drop"`` leaves out rows whose stamp repeats an earlier one, or goes back."""
     lead_in: NotNegative = 0.0
     """s at the beginning of every recording that drive the FMU and are not compared; a cut begins that much
     earlier, as far as the file goes."""
@@ -75,6 +77,8 @@ class ColumnTable(Table):
     estimated."""
     interpolation: Literal["linear", "hold"] = "linear"
     """``"hold"``: the value stays until the next sample, as a digital command does."""
+    time: Name | None = None
+    """A time column of its own, in the unit of ``[recordings.time]``; left out: that of all columns."""
     missing: list[Moderate] | None = None
     """Numbers of the file that mean "no value", such as ``[-9999.0]``; with any list, also ``[]``, blank cells mean it,
     too. Such samples are left out: an output is not compared there, an input runs straight over them."""

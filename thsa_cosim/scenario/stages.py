@@ -1,16 +1,18 @@
 """Scenarios in stages: benches in order, each with what the earlier ones found."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
 from thsa_cosim.errors import InputError, ScenarioError, UnitError, did_you_mean
-from thsa_cosim.scenario.load import load_scenario, read_toml
 from thsa_cosim.scenario.model import Scenario
+from thsa_cosim.scenario.recorded import load_scenario
 from thsa_cosim.scenario.schema import KINDS, StagesTable
 from thsa_cosim.scenario.sentences import from_validation, one_line
+from thsa_cosim.scenario.source import read_toml
 from thsa_cosim.units import convert
 
 Found = Callable[[float | None], Mapping[str, float]]
@@ -36,39 +38,20 @@ class StagedScenario:
     stages: tuple[Stage, ...]
 
 
-def load_study(
-    path: Path | str,
-    *,
-    fit: Sequence[Path | str] = (),
-    validate: Sequence[Path | str] = (),
-    seed: int | None = None,
-    fmu: Path | str | None = None,
-) -> Scenario | StagedScenario:
-    """Read a scenario file, or one that names others under ``[[stages]]``; all of them are checked at once.
+def load_stages(path: Path, data: Mapping[str, Any], seed: int | None = None) -> StagedScenario:
+    """Read the scenarios that ``[[stages]]`` names; all of them are checked at once.
 
     Raises
     ------
     ThsaCosimError
         As :func:`load_scenario`, and ScenarioError for stages that cannot work.
     """
-    path = Path(path)
-    data = read_toml(path)
-    if "stages" not in data:
-        for key in data:
-            if hint := did_you_mean(key, ["stages"]):
-                raise ScenarioError(one_line(f"{path}: unknown key {key!r}.{hint}"))
-        return load_scenario(path, fit=fit, validate=validate, seed=seed, fmu=fmu)
     try:
         table = StagesTable.model_validate(data)
     except ValidationError as error:
         raise from_validation(path, data, error) from None
     if table.kind not in KINDS:
         raise ScenarioError(one_line(f"{path}: kind is {table.kind!r}.{did_you_mean(table.kind, KINDS)}"))
-    if fit or validate or fmu:
-        raise ScenarioError(
-            f"{path}: has stages with recordings and FMUs of their own; replace them in the stages' files,"
-            f" or run one stage alone."
-        )
     stages = [_stage(path, k, table, seed) for k in range(len(table.stages))]
     names = [stage.name for stage in stages]
     if repeated := {name for name in names if names.count(name) > 1}:

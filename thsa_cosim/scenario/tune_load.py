@@ -11,10 +11,10 @@ from thsa_cosim.errors import InputError, MissingExtraError, ScenarioError, Unit
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.scenario import check
-from thsa_cosim.scenario.load import about_kind, read_toml
 from thsa_cosim.scenario.model import SearchSpec, SimulationSpec
 from thsa_cosim.scenario.schema import KINDS
 from thsa_cosim.scenario.sentences import from_validation, one_line
+from thsa_cosim.scenario.source import Source, about_kind, read_source
 from thsa_cosim.scenario.system import open_model
 from thsa_cosim.scenario.tune_drawn import line_spec, pareto_spec, surface_spec
 from thsa_cosim.scenario.tune_model import (
@@ -35,7 +35,7 @@ from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import convert
 
 
-def load_tune(path: Path | str, *, seed: int | None = None, fmu: Path | str | None = None) -> TuneScenario:
+def load_tune(source: Source, *, seed: int | None = None, fmu: Path | str | None = None) -> TuneScenario:
     """Read, check and resolve a scenario of kind "tune".
 
     ``seed`` and ``fmu`` replace the scenario's own.
@@ -47,8 +47,7 @@ def load_tune(path: Path | str, *, seed: int | None = None, fmu: Path | str | No
     FmuError, ParameterError, UnitError
         As the FMU and the values deserve. Every message is one line.
     """
-    path = Path(path)
-    data = read_toml(path)
+    path, data = read_source(source)
     kind = data.get("kind")
     if kind != "tune":
         if isinstance(kind, str) and kind in KINDS:

@@ -19,15 +19,11 @@ _PACKAGES = ("fmpy", "numba", "numpy", "pandas", "pint", "scipy")
 _LONG, _DIGEST = 60, 12
 
 
-def describe(scenario: Scenario | TuneScenario, command: str) -> dict[str, object]:
-    """What a reader of an unfinished study wants to know: what was asked, where from, with which search.
-
-    ``command``: the command line that repeats it, empty for a study that a script runs.
-    """
+def describe(scenario: Scenario | TuneScenario) -> dict[str, object]:
+    """What a reader of an unfinished study wants to know: what was asked, where from, with which search."""
     return {
         "title": scenario.title or scenario.path.stem,
         "scenario": str(scenario.path),
-        "command": command,
         "fmu": str(scenario.fmu.path),
         "method": scenario.search.method,
         "population": scenario.search.population,
@@ -36,7 +32,7 @@ def describe(scenario: Scenario | TuneScenario, command: str) -> dict[str, objec
     }
 
 
-def open_study(
+def claim_folder(
     folder: Path, identity: Mapping[str, object], about: Mapping[str, object] | None = None
 ) -> bool:
     """Create ``folder``, or check that it holds the same study; True if it is continued.

@@ -31,6 +31,7 @@ BY_CONTENT = {
     "kind": "the command counts: a diagnosis may be identified, any scenario be simulated",
     "seed": "--seed replaces it; the seed that is used counts",
     "fmu": "the digest of the archive",
+    "components.fmu": "the digest of the system that is made of them",
     "recordings.fit": "digests of the samples that are used",
     "recordings.validate": "digests of the samples that are used",
     "parameter_set": "the start values that follow from it, per point",
@@ -102,11 +103,8 @@ def _flat(value: Any, key: str, path: tuple[str, ...]) -> Iterable[tuple[str, An
         names = [str(getattr(member, "name", number)) for number, member in enumerate(value, start=1)]
         members = [(f"{key}[{name}]", name, member) for name, member in zip(names, value, strict=True)]
         yield from _members(key, path, members)
-    elif not isinstance(value, str) and isinstance(value, Sequence):
-        if value:
-            yield key, _plain(value)
     else:
-        yield key, value
+        yield key, _plain(value)
 
 
 def _members(

@@ -5,15 +5,15 @@ journal, so that a study that is run again repeats what it knows and goes on fro
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from thsa_cosim.batch import Job, Journal, JournalRow, Outcome, Runner, Status
-from thsa_cosim.identify import Progress
 from thsa_cosim.scenario import TuneScenario
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.study import OnProgress, Progress
 from thsa_cosim.tune.combine import Combined, combine
 from thsa_cosim.tune.problem import Case, Group
 
@@ -55,7 +55,7 @@ class Evaluator:
         journal: Journal,
         groups: Sequence[Group],
         names: Sequence[str],
-        on_progress: Callable[[Progress], None] | None = None,
+        on_progress: OnProgress | None = None,
     ) -> None:
         self.evaluations = 0
         self.planned = 0

@@ -3,20 +3,18 @@
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 
 from thsa_cosim import __version__
 from thsa_cosim.batch import Journal
 from thsa_cosim.errors import StudyError
-from thsa_cosim.identify import Progress
 from thsa_cosim.identify.interleave import interleave
-from thsa_cosim.scenario import TuneScenario, open_runner
+from thsa_cosim.scenario import TuneScenario
 from thsa_cosim.scenario.tune_model import combinations
 from thsa_cosim.search import EvolutionResult, EvolutionSettings, Generation, evolve
 from thsa_cosim.signals import FloatArray
-from thsa_cosim.study import describe, open_study, study_identity
+from thsa_cosim.study import Place, Study, describe, study_identity
 from thsa_cosim.tune.combine import INFEASIBLE, equation_7
 from thsa_cosim.tune.evaluate import Evaluation, Evaluator, Reply, Request, cases_of
 from thsa_cosim.tune.pareto import front
@@ -43,20 +41,11 @@ NEAR = 0.005
 Ask = Callable[[Request], Reply]
 
 
-def tune(
-    scenario: TuneScenario,
-    *,
-    folder: Path,
-    workers: int = 1,
-    cluster: str | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
-    command: str = "",
-) -> TuneResult:
-    """Tune the scenario's parameters in the study folder ``folder``; continue what it holds.
+def tune(scenario: TuneScenario, place: Place) -> TuneResult:
+    """Tune the scenario's parameters in the study folder of ``place``; continue what it holds.
 
     A KeyboardInterrupt ends the study early: the result then has the status "interrupted". The same call
-    continues it, and ends with what an undisturbed run would have found. ``command``: the command line that
-    repeats the study, to be kept with it.
+    continues it, and ends with what an undisturbed run would have found.
 
     Raises
     ------
@@ -69,23 +58,26 @@ def tune(
     checked: Sequence[Case] = ()
     if scenario.schedule is not None:
         checked = build_cases(scenario, combinations(scenario.schedule.check), sampled=False)
-    open_study(folder, study_identity(scenario), describe(scenario, command))
     names = Terms.of(scenario).names
-    study = _Study(scenario, groups, Group("check", {}, tuple(checked), scenario.requirements), names)
-    with Journal.open(folder / JOURNAL, scenario.parameters.names, names) as journal:
+    tuning = _Tuning(scenario, groups, Group("check", {}, tuple(checked), scenario.requirements), names)
+    with (
+        Study.open(place, study_identity(scenario), describe(scenario)) as study,
+        Journal.open(place.folder / JOURNAL, scenario.parameters.names, names) as journal,
+    ):
         try:
-            experiments = [case.experiment for case in cases_of([*groups, study.check])]
-            with open_runner(scenario.simulation, experiments, workers, cluster) as runner:
-                study.notes += runner.notes
-                evaluator = Evaluator(scenario, runner, journal, groups, names, on_progress)
-                study.run(evaluator, journal)
+            experiments = [case.experiment for case in cases_of([*groups, tuning.check])]
+            with study.open_runner(scenario.simulation, experiments) as runner:
+                tuning.notes += runner.notes
+                evaluator = Evaluator(scenario, runner, journal, groups, names, place.on_progress)
+                tuning.run(evaluator, journal)
+            study.complete()
         except KeyboardInterrupt:
-            study.interrupted = True
-    return study.result()
+            tuning.interrupted = True
+    return tuning.result()
 
 
 @dataclass(eq=False)
-class _Study:
+class _Tuning:
     """What has been found so far."""
 
     scenario: TuneScenario

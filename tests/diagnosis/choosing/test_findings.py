@@ -26,7 +26,7 @@ def parameter(variable: str, role: str = "coefficient", **more: Any) -> Any:
 def proposal(
     effect: str, gain: float, place: str = "motor", information: float = 1.0, start: float = 0.0
 ) -> Any:
-    own = parameter(f"{place}.{effect}.k")
+    own = parameter(f"{place}.{effect}.k", scanned=False)
     candidate: Any = SimpleNamespace(
         effect=SimpleNamespace(name=effect, title=f"Title of {effect}"),
         name=f"{effect}:{place}",

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from thsa_cosim.diagnosis.explaining.balance import close_balances
 from thsa_cosim.diagnosis.results import Balance
 from thsa_cosim.errors import ScenarioError
-from thsa_cosim.scenario import load_scenario
+from thsa_cosim.scenario import Scenario, load_scenario
 from thsa_cosim.scenario.formula import parse_formula
 
 FMU = Path(__file__).parents[3] / "fmus" / "THSA.fmu"
@@ -64,7 +64,14 @@ MECHANICAL = {
 
 
 def close(folder: Path, data: pd.DataFrame, *balances: dict, start: float = 9e3) -> dict[str, Balance]:
-    """The balances of a scenario whose only recording is ``data``; F_fn is ``start`` N on the drawing."""
+    """The balances of :func:`scenario_of`, by name."""
+    scenario = scenario_of(folder, data, *balances, start=start)
+    assert scenario.diagnose is not None
+    return {b.equation: b for b in close_balances(scenario, scenario.diagnose)}
+
+
+def scenario_of(folder: Path, data: pd.DataFrame, *balances: dict, start: float = 9e3) -> Scenario:
+    """A scenario whose only recording is ``data``; F_fn is ``start`` N on the drawing."""
     data.to_parquet(folder / "data.parquet")
     data.head(100).to_parquet(folder / "held_out.parquet")
     columns = {"F_load": "load", "w_m": "w_m", "i_q": "i_q", "u_q": "u_q"}
@@ -94,10 +101,7 @@ def close(folder: Path, data: pd.DataFrame, *balances: dict, start: float = 9e3)
         lines += ["[[diagnose.balances]]", *(f"{k} = {json.dumps(v)}" for k, v in balance.items())]
     path = folder / "scenario.toml"
     path.write_text("\n".join(lines), encoding="utf-8")
-    scenario = load_scenario(path)
-    assert scenario.diagnose is not None
-    found = close_balances(scenario, scenario.diagnose)
-    return {b.equation: b for b in found}
+    return load_scenario(path)
 
 
 def passing(band: float) -> float:

@@ -78,9 +78,10 @@ def find(monkeypatch: pytest.MonkeyPatch, other: Force, **changed: Any) -> Any:
     """The experiment between a rival without force and one with ``other``."""
     still: Force = lambda s: np.zeros(s.time.size)  # noqa: E731
     broken = changed.pop("broken", "")
-    monkeypatch.setattr(
-        room, "open_runner", lambda spec, experiments, *_: Rig(experiments, {1.0: still, 2.0: other}, broken)
-    )
+
+    def open_runner(_: Any, experiments: Any) -> Any:
+        return Rig(experiments, {1.0: still, 2.0: other}, broken)
+
     winner = scored("windage", 1.0, np.zeros(TIME.size))
     rival = scored("stribeck:screw", 2.0, np.full(TIME.size, 0.5))
     attribution = SimpleNamespace(
@@ -90,7 +91,7 @@ def find(monkeypatch: pytest.MonkeyPatch, other: Force, **changed: Any) -> Any:
     spec = SimpleNamespace(command="v_cmd", load="F_load")
     given = {"found": attribution, "spec": spec} | changed
     scenario = SimpleNamespace(simulation=None)
-    return room.separating_experiment(scenario, given["spec"], given["found"], [trial()], 2)  # type: ignore[arg-type]
+    return room.separating_experiment(scenario, given["spec"], given["found"], [trial()], open_runner)  # type: ignore[arg-type]
 
 
 def slow(inputs: Signals) -> np.ndarray:

@@ -14,7 +14,7 @@ from thsa_cosim.diagnosis.catalogue.effect import Effect
 from thsa_cosim.errors import StudyError
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.identify.problem import Case
-from thsa_cosim.scenario import BlackBoxSpec, Scenario, SimulationSpec, open_runner
+from thsa_cosim.scenario import BlackBoxSpec, Executor, Scenario, SimulationSpec
 from thsa_cosim.signals import FloatArray, Signals
 
 #: The step of the load that shows what a load costs, in the largest load of the recordings.
@@ -93,7 +93,7 @@ def _simulate(
 ) -> dict[str, Signals]:
     """The outputs of every case that can be simulated, by name; StudyError if none can."""
     experiments: list[Experiment] = [replace(c.experiment(c.name, None), outputs=outputs) for c in cases]
-    with open_runner(simulation, experiments, 1, None) as runner:
+    with Executor().open_runner(simulation, experiments) as runner:
         outcomes = runner.run([Job(e.name) for e in experiments])
     found = {
         e.name: o.signals

@@ -82,6 +82,8 @@ def candidates_of(
     slots = tuple(slots)
     found = []
     for effect in effects:
+        if effect.part == "screw" and not has_screw(slots):
+            continue
         for slot in slots:
             fitting = [
                 v
@@ -94,6 +96,15 @@ def candidates_of(
                 unique = tuple({p.name: p for p in same}.values())
                 found.append(Candidate(effect, variant, slot, number, resolved[id(variant)], unique))
     return tuple(found)
+
+
+def has_screw(slots: Iterable[Slot]) -> bool:
+    """Whether something turns a shaft's angle into a path: a place moves along a length, or is the screw's own."""
+    return any(
+        slot.interface in ("ShaftEffect", "ContactEffect")
+        or slot.units.get("z", "rad") not in ("rad", "deg", "1")
+        for slot in slots
+    )
 
 
 def _resolve(variant: Variant, slot: Slot, scales: Mapping[str, float]) -> tuple[CandidateParameter, ...]:

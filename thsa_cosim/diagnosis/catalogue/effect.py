@@ -118,3 +118,5 @@ class Effect:
     source: str
     signature: str
     variants: tuple[Variant, ...]
+    part: Literal["screw"] | None = None
+    """Offered only to machines that have this part."""

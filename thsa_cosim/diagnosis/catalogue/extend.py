@@ -11,6 +11,10 @@ from pathlib import Path
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.catalogue.slots import INPUTS, OUTPUTS, Slot
 from thsa_cosim.export import export_fmu
+from thsa_cosim.export.compile import this_platform
+
+#: Extended models are named after their own class; the system model of the shipped package goes by the package's name.
+KNOWN_AS = {"THSA.Actuator": "THSA"}
 
 
 def extended_class(
@@ -69,14 +73,19 @@ def write_extended(folder: Path, name: str, source: str) -> Path:
 def write_extended_model(
     folder: Path, model: str, package: Path, candidates: Sequence[Candidate], values: Mapping[str, float]
 ) -> tuple[Path, Path]:
-    """Write the class that holds the candidates with their ``values``, and export it; (.mo, .fmu) in ``folder``."""
+    """Write the class that holds the candidates with their ``values``, and export it; (.mo, .fmu) in ``folder``.
+
+    The FMU is for this machine: compilers of other platforms are only started when somebody asks for them.
+    """
     base = qualified(model, package)
     effects = list(dict.fromkeys(c.effect.name for c in candidates))
-    name = "_and_".join([f"{base.split('.')[0]}_with_{effects[0]}", *effects[1:]]).replace("-", "_")
+    own = KNOWN_AS.get(base, base.split(".")[-1])
+    name = "_and_".join([f"{own}_with_{effects[0]}", *effects[1:]]).replace("-", "_")
     titles = ", ".join(dict.fromkeys(c.effect.title for c in candidates))
     source = extended_class(name, base, candidates, values, f"{base} with: {titles}")
     file = write_extended(folder, name, source)
-    return file, export_fmu(str(file), package=package, output=folder / f"{name}.fmu")
+    fmu = folder / f"{name}.fmu"
+    return file, export_fmu(str(file), package=package, output=fmu, platforms=this_platform())
 
 
 def qualified(model: str, package: Path) -> str:

@@ -3,7 +3,6 @@
 One FMU serves the whole search: a candidate is a few start values. At neutral it is the declared model.
 """
 
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,14 +16,12 @@ from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, wri
 from thsa_cosim.diagnosis.catalogue.slots import SCALES, Slot, find_slots
 from thsa_cosim.errors import StudyError
 from thsa_cosim.export import export_fmu
+from thsa_cosim.export.compile import this_platform
 from thsa_cosim.fmu import read_description
 from thsa_cosim.identify.problem import Case
-from thsa_cosim.scenario import Scenario, SimulationSpec, open_runner
+from thsa_cosim.scenario import Executor, Scenario, SimulationSpec
 from thsa_cosim.signals import Signals
 from thsa_cosim.study import export_digest, is_made_from, note_made_from
-
-#: What an FMU for this machine alone is compiled for.
-_HERE = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +35,6 @@ class Superset:
     slots: tuple[Slot, ...]
     candidates: tuple[Candidate, ...]
     signals_at: Callable[[Mapping[str, Mapping[str, float]]], Mapping[str, Signals]]
-
-
-def this_platform() -> tuple[str, ...] | None:
-    """What to compile for to run here; None (all) on a machine that is not known."""
-    name = _HERE.get(sys.platform)
-    return (name,) if name else None
 
 
 def open_superset(
@@ -94,7 +85,7 @@ def scales_of(
     known = read_description(fmu).variables
     outputs = tuple(dict.fromkeys(v for v in wanted.values() if v in known))
     experiments = [_with_outputs(case, outputs) for case in cases]
-    with open_runner(simulation, experiments, 1, None) as runner:
+    with Executor().open_runner(simulation, experiments) as runner:
         outcomes = runner.run([Job(e.name) for e in experiments])
     runs = [o.signals for o in outcomes if o.status == Status.OK and o.signals is not None]
     if not runs:
@@ -137,6 +128,6 @@ def slot_signals(
         f"{s.component}.{v}" for s in slots if s.interface == "FrictionEffect" for v in ("v", "z", "N")
     )
     experiments = [_with_outputs(case, outputs) for case in cases]
-    with open_runner(simulation, experiments, 1, None) as runner:
+    with Executor().open_runner(simulation, experiments) as runner:
         outcomes = runner.run([Job(c.name, values[c.name]) for c in cases])
     return {c.name: o.signals for c, o in zip(cases, outcomes, strict=True) if o.signals is not None}

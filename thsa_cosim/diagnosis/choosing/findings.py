@@ -5,7 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from thsa_cosim.diagnosis.catalogue.known import known_effects
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round
+from thsa_cosim.diagnosis.choosing.orders import Machine, Order, name_by_order
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -14,6 +16,8 @@ from thsa_cosim.diagnosis.results import FoundEffect, Judged, Value
 
 #: An error above this share of its value leaves it open; one above this share of the drawing's is the drawing's.
 CLEAR, NO_MORE = 1.0 / 3.0, 0.95
+#: A machine of which no ratio is known.
+NO_MACHINE = Machine({}, {})
 #: What would not be seen at this many times its ordinary size cannot be tested.
 HUGE = 10.0
 
@@ -62,7 +66,7 @@ def vague(members: Sequence[Scored], values: Mapping[str, Value]) -> dict[str, V
     return found
 
 
-def found_effects(found: Attribution, fit: Fit) -> tuple[FoundEffect, ...]:
+def found_effects(found: Attribution, fit: Fit, machine: Machine = NO_MACHINE) -> tuple[FoundEffect, ...]:
     """The accepted effects with the values of the extended model; variants and places of one effect are one."""
     merged: dict[str, list[Scored]] = {}
     for scored in found.accepted:
@@ -71,18 +75,45 @@ def found_effects(found: Attribution, fit: Fit) -> tuple[FoundEffect, ...]:
     effects = []
     for members in merged.values():
         owner = _round_of(found, members[0])
-        rivals = tuple(r.candidate.name for r in owner.rivals)
+        order = order_of(members[0], values, machine)
+        name = _named(members[0], order)
+        rivals = tuple(dict.fromkeys(_rival_name(r, machine) for r in owner.rivals))
+        rivals = tuple(r for r in rivals if r != name)
         chance = owner.probability(members[0].fit_gain)
         effects.append(
             FoundEffect(
-                name=members[0].candidate.name,
-                title=members[0].candidate.effect.title,
+                name=name,
+                title=_title(members[0], name),
                 parameters=_parameters(members, vague(members, values)),
                 equivalent=rivals,
                 probability=(1.0 - chance) / (1 + len(rivals)),
+                order="" if order is None else str(order),
             )
         )
     return tuple(effects)
+
+
+def order_of(scored: Scored, values: Mapping[str, Value], machine: Machine) -> Order | None:
+    """The order of a ripple in the machine; None for what does not repeat, or over no shaft's turn."""
+    for p in scored.candidate.parameters:
+        if p.scanned:
+            wave = values.get(p.variable, Value(scored.proposal.shapes.get(p.name, 0.0), p.unit, 0.0))
+            return machine.order(scored.candidate.slot.name, wave.value, wave.stderr)
+    return None
+
+
+def _named(scored: Scored, order: Order | None) -> str:
+    ripple = any(p.scanned for p in scored.candidate.parameters)
+    return name_by_order(scored.candidate, order) if ripple else scored.candidate.name
+
+
+def _rival_name(rival: Scored, machine: Machine) -> str:
+    return _named(rival, order_of(rival, values_of(rival.fit, declared=False), machine))
+
+
+def _title(scored: Scored, name: str) -> str:
+    effect = name.split(":")[0]
+    return scored.candidate.effect.title if scored.candidate.name == name else known_effects()[effect].title
 
 
 def _parameters(members: list[Scored], values: Mapping[str, Value]) -> dict[str, Value]:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.slots import Slot
+from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.structure import per_trial
@@ -25,8 +26,9 @@ def wave_number_finder(
     bench: Bench,
     slots: Sequence[Slot],
     signals_at: Callable[[Mapping[str, Mapping[str, float]]], Mapping[str, Signals]],
+    machine: Machine,
 ) -> Callable[[Fit], Mapping[str, Sequence[float]]]:
-    """Return a function: fit → per friction slot the wave numbers at which its residuals repeat.
+    """Return a function: fit → per friction slot the wave numbers at which its residuals repeat, and the machine's.
 
     ``signals_at``: start values by case → ``<slot's component>.z`` of every friction slot by case.
     """
@@ -49,7 +51,7 @@ def wave_number_finder(
             angular = slot.units.get("z") == "rad"
             reach = max((float(np.max(np.abs(z))) for z in positions), default=1.0) or 1.0
             grid = _HARMONICS if angular else 2.0 * np.pi * _PERIODS / reach
-            found[slot.name] = wave_numbers(positions, own, grid)
+            found[slot.name] = (*wave_numbers(positions, own, grid), *machine.starts(slot.name))
         return found
 
     return scan

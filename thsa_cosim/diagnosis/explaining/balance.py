@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
-from thsa_cosim.diagnosis.fitting.trials import group_of, trials_of
+from thsa_cosim.diagnosis.fitting.trials import Trial, group_of, trials_of
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown
 from thsa_cosim.diagnosis.results import Balance
 from thsa_cosim.inverse_dynamics import low_pass
@@ -48,12 +48,7 @@ def close_balances(scenario: Scenario, spec: DiagnoseSpec) -> tuple[Balance, ...
     noise). A balance that no recording lets form (standing throughout, too short for the band) is left out.
     """
     trials = trials_of(scenario)
-    names = {p.variable: p.name for p in scenario.parameters.parameters}
-    drawing: dict[str, dict[str, Unknown]] = {trial.group: {} for trial in trials}
-    for unknown in declared_unknowns(scenario, trials).members:
-        for group, own in drawing.items():
-            if unknown.group in (None, group):
-                own[names[unknown.variable]] = unknown
+    drawing = drawings_of(scenario, trials)
     found = (_close(scenario, balance, drawing) for balance in spec.balances)
     return tuple(balance for balance in found if balance is not None)
 
@@ -61,17 +56,15 @@ def close_balances(scenario: Scenario, spec: DiagnoseSpec) -> tuple[Balance, ...
 def _close(
     scenario: Scenario, spec: BalanceSpec, drawing: Mapping[str, Mapping[str, Unknown]]
 ) -> Balance | None:
-    known = (*scenario.inputs, *scenario.measured, *scenario.parameters.names)
-    where = f"{scenario.path}: diagnose.balances[{spec.name}]"
-    formulas = tuple(parse_formula(text, known, where) for text in (spec.left, *spec.terms))
-    groups: dict[str, list[_Record]] = {}
+    formulas = formulas_of(scenario, spec)
+    groups: dict[str, list[Record]] = {}
     for recording in scenario.fit:
-        record = _record(recording, spec, formulas)
+        record = record_of(recording, spec, formulas)
         if record is not None:
             group = group_of(recording.temperature_degC, scenario.round_to)
             groups.setdefault(group, []).append(record)
     generator = np.random.default_rng(scenario.seed)
-    closed = [_Regression(spec.band, tuple(r), drawing[g]).solve(generator) for g, r in groups.items()]
+    closed = [Regression(spec.band, tuple(r), drawing[g]).solve(generator) for g, r in groups.items()]
     squares, noise_squares = sum(c.squares for c in closed), sum(c.noise_squares for c in closed)
     samples, independent = sum(c.samples for c in closed), sum(c.independent for c in closed)
     if noise_squares == 0.0 or independent < 1.0:
@@ -88,8 +81,26 @@ def _close(
     )
 
 
+def formulas_of(scenario: Scenario, spec: BalanceSpec) -> tuple[Formula, ...]:
+    """The left side and the terms of a balance."""
+    known = (*scenario.inputs, *scenario.measured, *scenario.parameters.names)
+    where = f"{scenario.path}: diagnose.balances[{spec.name}]"
+    return tuple(parse_formula(text, known, where) for text in (spec.left, *spec.terms))
+
+
+def drawings_of(scenario: Scenario, trials: tuple[Trial, ...]) -> dict[str, dict[str, Unknown]]:
+    """The declared parameters of every group of recordings, by name."""
+    names = {p.variable: p.name for p in scenario.parameters.parameters}
+    drawing: dict[str, dict[str, Unknown]] = {trial.group: {} for trial in trials}
+    for unknown in declared_unknowns(scenario, trials).members:
+        for group, own in drawing.items():
+            if unknown.group in (None, group):
+                own[names[unknown.variable]] = unknown
+    return drawing
+
+
 @dataclass(frozen=True, eq=False)
-class _Record:
+class Record:
     """A recording on an even grid every ``step`` s: signals (n,), their noise, and the samples (n,) that count."""
 
     formulas: tuple[Formula, ...]
@@ -146,20 +157,30 @@ class _Closed:
 
 
 @dataclass(frozen=True, eq=False)
-class _Regression:
+class Regression:
     """The recordings of one temperature, with the declared parameters that the formulas name."""
 
     band: float
-    records: tuple[_Record, ...]
+    records: tuple[Record, ...]
     drawing: Mapping[str, Unknown]
 
     def solve(self, generator: np.random.Generator) -> _Closed:
         """Fit coefficients and parameters, then hold the residual against drawn noise."""
+        inside, noise = self.fit(generator)
+        residual, coefficients = self.project(inside)
+        independent = 2.0 * self.band * sum(r.seconds for r in self.records)
+        fitted = len(coefficients) + len(inside)
+        return _Closed(
+            float(residual @ residual), noise**2 * residual.size, residual.size, independent - fitted
+        )
+
+    def fit(self, generator: np.random.Generator) -> tuple[dict[str, float], float]:
+        """The declared parameters that the formulas name, and what drawn noise makes of the residual (rms)."""
         named = frozenset().union(*(f.names for f in self.records[0].formulas))
         used = {n: u for n, u in self.drawing.items() if n in named}
         inside = {n: u.start for n, u in used.items()}
         independent = 2.0 * self.band * sum(r.seconds for r in self.records)
-        residual, coefficients = self._project(inside)
+        residual, coefficients = self.project(inside)
         noise = self._noise(inside, coefficients, generator)
         if used and noise > 0.0:
             weight = np.sqrt(independent / residual.size) / noise  # as if only independent values counted
@@ -170,21 +191,17 @@ class _Regression:
                 }
 
             def deviations(moves: FloatArray) -> FloatArray:
-                return np.append(self._project(moved(moves))[0] * weight, moves)
+                return np.append(self.project(moved(moves))[0] * weight, moves)
 
             steps = np.full(len(used), 1e-2)
             found = least_squares(
                 deviations, np.zeros(len(used)), bounds=(-4.0, 4.0), diff_step=steps, max_nfev=8
             )
             inside = moved(found.x)
-            residual, coefficients = self._project(inside)
-            noise = self._noise(inside, coefficients, generator)
-        fitted = len(coefficients) + len(used)
-        return _Closed(
-            float(residual @ residual), noise**2 * residual.size, residual.size, independent - fitted
-        )
+            noise = self._noise(inside, self.project(inside)[1], generator)
+        return inside, noise
 
-    def _project(self, inside: Inside) -> tuple[FloatArray, FloatArray]:
+    def project(self, inside: Inside) -> tuple[FloatArray, FloatArray]:
         """Residual (m,) and coefficients (k,) by least squares."""
         sides = np.concatenate([r.sides(inside) for r in self.records])
         left, terms = sides[:, 0], sides[:, 1:]
@@ -199,7 +216,7 @@ class _Regression:
         return float(np.sqrt(np.mean(np.concatenate(drawn) ** 2)))
 
 
-def _record(recording: Recording, spec: BalanceSpec, formulas: tuple[Formula, ...]) -> _Record | None:
+def record_of(recording: Recording, spec: BalanceSpec, formulas: tuple[Formula, ...]) -> Record | None:
     """A recording for a balance, or None where it is too short for the band or stands throughout."""
     signals = recording.compared
     step = float(np.median(np.diff(signals.time)))
@@ -215,7 +232,7 @@ def _record(recording: Recording, spec: BalanceSpec, formulas: tuple[Formula, ..
     for name in spec.moving:
         still |= _standing(values[name], recording.noise.get(name, 0.0))
     kept = np.convolve(still, np.ones(2 * reach + 1), mode="same") < 0.5
-    return _Record(formulas, values, recording.noise, kept, step, spec.band) if kept.any() else None
+    return Record(formulas, values, recording.noise, kept, step, spec.band) if kept.any() else None
 
 
 def _standing(speed: FloatArray, noise: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -13,7 +13,7 @@ from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Variant
 from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, write_extended
 from thsa_cosim.diagnosis.catalogue.slots import find_slots
-from thsa_cosim.diagnosis.catalogue.superset import scales_of, this_platform
+from thsa_cosim.diagnosis.catalogue.superset import scales_of
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import values_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
@@ -23,7 +23,8 @@ from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import EmpiricalLaw, EmpiricalTerm
 from thsa_cosim.export import export_fmu
-from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
+from thsa_cosim.export.compile import this_platform
+from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
 
 #: At most so many terms: a law of more says no more than a plot.
 _TERMS = 3
@@ -68,8 +69,7 @@ class LawSearch:
     accepted: tuple[Scored, ...]
     after: Identified
     folder: Path
-    workers: int
-    cluster: str | None = None
+    open_runner: OpenRunner
 
     def find(self) -> Attribution | None:
         """The terms that pass the gate; None if there is none, or nothing can be simulated."""
@@ -93,7 +93,7 @@ class LawSearch:
         trials = with_fmu(self.trials, fmu)
         scales = scales_of(fmu, slots, [t.case for t in trials if t.part == "fit"], simulation)
         candidates = candidates_of((EMPIRICAL,), slots, scales)
-        with open_runner(simulation, [t.experiment for t in trials], self.workers, self.cluster) as runner:
+        with self.open_runner(simulation, [t.experiment for t in trials]) as runner:
             bench = Bench(runner, trials)
             found = attribute(
                 bench, self._unknowns(), candidates, lambda _: {}, seed=self.scenario.seed, most=_TERMS

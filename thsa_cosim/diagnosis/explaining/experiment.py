@@ -15,7 +15,7 @@ from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.explaining.profiles import Profile, input_range, profiles, travel
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.results import SeparatingExperiment
-from thsa_cosim.scenario import DiagnoseSpec, Scenario, open_runner
+from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
 from thsa_cosim.signals import FloatArray, Signals
 
 #: Longest experiment that is tried, in s, and how many samples it has at most.
@@ -27,8 +27,7 @@ def separating_experiment(
     spec: DiagnoseSpec,
     found: Attribution,
     trials: Sequence[Trial],
-    workers: int,
-    cluster: str | None = None,
+    open_runner: OpenRunner,
 ) -> SeparatingExperiment | None:
     """The profile of ``spec.command`` and ``spec.load`` at which the first effect and its rival differ most.
 
@@ -60,7 +59,7 @@ def separating_experiment(
     ]
     if not jobs:
         return None
-    with open_runner(scenario.simulation, experiments, workers, cluster) as runner:
+    with open_runner(scenario.simulation, experiments) as runner:
         outcomes = runner.run(jobs)
     weights = {c.name: c.weight / c.noise**2 for c in first.case.channels}
     best: SeparatingExperiment | None = None

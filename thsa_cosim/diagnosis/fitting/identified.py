@@ -11,7 +11,7 @@ from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
 from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.errors import StudyError
-from thsa_cosim.scenario import SimulationSpec, open_runner
+from thsa_cosim.scenario import OpenRunner, SimulationSpec
 from thsa_cosim.signals import FloatArray, Signals
 
 
@@ -34,15 +34,14 @@ def identify_model(
     unknowns: Unknowns,
     starts: Sequence[FloatArray],
     simulation: SimulationSpec,
-    workers: int,
-    cluster: str | None,
+    open_runner: OpenRunner,
 ) -> Identified:
     """Identify ``unknowns`` of an FMU on the fit recordings from every one of ``starts``; the best fit counts.
 
     StudyError if the FMU cannot be simulated at any start.
     """
     own = with_fmu(trials, fmu)
-    with open_runner(simulation, [t.experiment for t in own], workers, cluster) as runner:
+    with open_runner(simulation, [t.experiment for t in own]) as runner:
         bench = Bench(runner, own)
         found = bench.residuals(unknowns, np.array(starts), "fit")
         fits: list[Fit] = []

@@ -8,7 +8,14 @@ from typing import Any
 
 import pandas as pd
 
-from thsa_cosim.diagnosis.results import ChannelError, DiagnosisResult, EmpiricalLaw, Errors, Value
+from thsa_cosim.diagnosis.results import (
+    ChannelError,
+    DiagnosisResult,
+    EmpiricalLaw,
+    Errors,
+    Evidence,
+    Value,
+)
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.inspection import judge_ratios
 from thsa_cosim.report.files import RESULT, write_json
@@ -30,6 +37,7 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
                 "parameters": _values(e.parameters),
                 "equivalent": list(e.equivalent),
                 "probability": e.probability,
+                "order": e.order,
             }
             for e in result.effects
         ],
@@ -75,6 +83,7 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
             }
             for b in result.balances
         ],
+        "evidence": None if result.evidence is None else _evidence(result.evidence),
         "empirical": None if result.empirical is None else _law(result.empirical),
         "equivalence": [{"names": list(c.names), "angle_deg": c.angle_deg} for c in result.equivalence],
         "experiment": None
@@ -145,6 +154,14 @@ def _law(law: EmpiricalLaw) -> dict[str, Any]:
         "held_out_gain": law.held_out_gain,
         "added": law.added,
     }
+
+
+def _evidence(found: Evidence) -> dict[str, Any]:
+    """The evidence with null where a model says nothing."""
+    columns = ("at", "measured", "stderr", "before", "after")
+    bins = {name: [None if math.isnan(v) else v for v in getattr(found, name)] for name in columns}
+    words = ("equation", "unit", "left", "part", "cause", "cause_unit", "share")
+    return {**{name: getattr(found, name) for name in words}, "bins": bins}
 
 
 def _force(before: ForceBalance, after: ForceBalance | None) -> dict[str, Any]:

@@ -42,6 +42,15 @@ def attribution(part: Part) -> Section | None:
     return Section(f"{part.prefix}attribution", "Where the residual arises", blocks)
 
 
+def clearest(part: Part) -> Figure | None:
+    """The one panel in which a residual depends most clearly on something; None without the table."""
+    path = part.folder / STRUCTURE
+    panels = _read(path) if path.is_file() else []
+    if not panels:
+        return None
+    return _figure(f"{part.prefix}evidence", [max(panels, key=lambda panel: panel.clarity)], height=340)
+
+
 def structure(part: Part) -> Section | None:
     """The mean residual over each variable that it may depend on, before and after; None without the table.
 
@@ -137,10 +146,10 @@ def _read(path: Path) -> list[_Panel]:
     return [_Panel(*key, *np.array(sorted(values), dtype=np.float64).T) for key, values in rows.items()]
 
 
-def _figure(name: str, panels: list[_Panel]) -> Figure:
+def _figure(name: str, panels: list[_Panel], height: int = 210) -> Figure:
     columns = min(COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
-    drawn = Chart(name, rows=rows, columns=columns, row_height=210)
+    drawn = Chart(name, rows=rows, columns=columns, row_height=height)
     for k, panel in enumerate(panels):
         at = divmod(k, columns)
         for label, values, colour in (("before", panel.before, BEFORE), ("after", panel.after, AFTER)):

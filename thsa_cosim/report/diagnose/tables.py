@@ -17,7 +17,7 @@ def sentence(content: Content) -> str:
     if content["verdict"] == "no-missing-effect":
         return "No missing effect: what is left is noise, or declared parameters that were tuned again."
     effects = content["effects"]
-    found = " and ".join(f"{e['title'][0].lower()}{e['title'][1:]} ({e['name']})" for e in effects)
+    found = " and ".join(f"{e['title'][0].lower()}{e['title'][1:]} ({_place(e)})" for e in effects)
     if content["verdict"] == "missing-effect":
         text = f"The model lacks {found}."
         ties = [f"{e['name']} from {', '.join(e['equivalent'])}" for e in effects if e["equivalent"]]
@@ -31,6 +31,11 @@ def sentence(content: Content) -> str:
         text = f"The model lacks {found}; beside that, structure is left that no effect of the catalogue explains"
         return f"{text} ({share})."
     return f"Structure is left that no effect of the catalogue explains ({share})."
+
+
+def _place(effect: Mapping[str, Any]) -> str:
+    order = effect.get("order")
+    return f"{effect['name']}, {order}" if order else str(effect["name"])
 
 
 def print_diagnosis(console: Console, content: Content) -> None:

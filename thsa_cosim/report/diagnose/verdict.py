@@ -1,5 +1,7 @@
 """A diagnosis: the verdict with the effects it names, and whether they help on recordings that no fit has seen."""
 
+from collections.abc import Sequence
+
 from thsa_cosim.report.folder import Json, Part
 from thsa_cosim.report.parts.chart import AFTER, BEFORE, Chart
 from thsa_cosim.report.parts.comparison import noise_ratio, ratio_mark, recording_folds, role_text
@@ -35,7 +37,7 @@ def verdict(result: Json) -> tuple[Block, ...]:
     sentence = _VERDICTS.get(word, word).format(effects=names)
     if word == "unexplained-structure" and effects:
         sentence = f"The model lacks {names}. Beside that, s" + sentence[1:]
-    blocks: list[Block] = [Text(sentence, "good" if word == "no-missing-effect" else "bad")]
+    blocks: list[Block] = [Text(sentence, "lead good" if word == "no-missing-effect" else "lead bad")]
     if effects:
         blocks.append(_effects_table(effects))
     facts = []
@@ -56,10 +58,56 @@ def verdict(result: Json) -> tuple[Block, ...]:
     return (*blocks, Facts(facts)) if facts else tuple(blocks)
 
 
+def recordings_table(result: Json) -> list[Block]:
+    """Errors before and after as multiples of the noise: pooled by role, then for each recording."""
+    rows: list[tuple[str, _Ratios]] = []
+    for role in ("fit", "validate"):
+        rows += _ratio_rows(result, (role,), role_text(role))
+    names = dict.fromkeys((result.get("before") or {}).get("recordings", {}))
+    for name in names:
+        rows += _ratio_rows(result, ("recordings", name), name)
+    if not rows:
+        return []
+    channels = list(dict.fromkeys(channel for _, own in rows for channel in own))
+    columns = [Column("recordings", numeric=False)]
+    columns += [Column(channel) for channel in channels]
+    cells = []
+    for label, own in rows:
+        line = [text_cell(label)]
+        for channel in channels:
+            before, after = own.get(channel, (None, None))
+            text = significant_cell(before).text + (
+                "" if after is None else f" → {significant_cell(after).text}"
+            )
+            line.append(Cell(text, before if after is None else after, ratio_mark(after)))
+        cells.append(line)
+    note = "rmse / noise: 1 is all that a model can reach. Before → after; green is down to the noise."
+    return [Table("Errors before → after, as multiples of the noise", columns, cells, note)]
+
+
+_Ratios = dict[str, tuple[float | None, float | None]]
+
+
+def _ratio_rows(result: Json, place: Sequence[str], label: str) -> list[tuple[str, _Ratios]]:
+    """The errors at a place of ``before`` and ``after``, by channel; no row where there are none."""
+    before, after = result.get("before") or {}, result.get("after") or {}
+    for key in place:
+        before, after = before.get(key) or {}, after.get(key) or {}
+    own = {
+        channel: (noise_ratio(error), noise_ratio(after[channel]) if channel in after else None)
+        for channel, error in before.items()
+    }
+    return [(label, own)] if own else []
+
+
 def held_out(result: Json) -> str:
     """One sentence on how far the error on held-out recordings fell; empty without such recordings."""
     ratios = [
-        [r for e in result.get(when, {}).get("validate", {}).values() if (r := noise_ratio(e)) is not None]
+        [
+            r
+            for e in (result.get(when) or {}).get("validate", {}).values()
+            if (r := noise_ratio(e)) is not None
+        ]
         for when in ("before", "after")
     ]
     if not ratios[0]:
@@ -254,7 +302,7 @@ def _experiment(content: Json | None) -> list[tuple[str, str]]:
     return [
         (
             "to tell them apart",
-            f"Record {content['name']} ({content.get('file', 'experiment.csv')}): it sets {listing(content['rivals'])}"
-            f" {apart} variances of the noise apart, these recordings {now}.",
+            f"Record {content['name']} ({content.get('file', 'experiment.csv')}): there {listing(content['rivals'])}"
+            f" differ by {apart} variances of the noise, in these recordings by {now}.",
         )
     ]

@@ -7,7 +7,7 @@ from thsa_cosim.report.folder import Json
 from thsa_cosim.report.parts import chart
 from thsa_cosim.report.parts.chart import Chart
 from thsa_cosim.report.parts.content import Block, Cell, Column, Figure, Section, Table
-from thsa_cosim.report.parts.text import DASH, degrees, number, percent, plus_minus, text_cell
+from thsa_cosim.report.parts.text import DASH, bound_text, degrees, number, percent, plus_minus, text_cell
 
 
 def parameters(result: Json, prefix: str = "") -> Section | None:
@@ -18,10 +18,16 @@ def parameters(result: Json, prefix: str = "") -> Section | None:
     blocks: list[Block] = []
     laws: Json = result.get("laws", {})
     if laws:
-        blocks += [_figure(points, laws, prefix), _laws_table(laws)]
+        blocks.append(_laws_table(laws))
     blocks.append(_points_table(points))
     title = "Parameters over temperature" if laws else "Parameters"
     return Section(f"{prefix}parameters", title, tuple(blocks))
+
+
+def laws_figure(result: Json, prefix: str = "") -> Figure | None:
+    """All laws with the points that they go through; None without a law."""
+    points, laws = result.get("points", []), result.get("laws", {})
+    return _figure(points, laws, prefix) if points and laws else None
 
 
 def read_law(content: Json) -> Law:
@@ -168,6 +174,9 @@ def _points_table(points: list[Json]) -> Table:
             sure = estimate["identifiable"]
             unsure = unsure or not sure
             text = plus_minus(estimate["value"], estimate["stderr"])
+            on_bound = bound_text(estimate)
+            text += f" {on_bound}" if on_bound else ""
+            sure = sure and not on_bound
             row.append(Cell(text if sure else f"({text})", estimate["value"], "" if sure else "bad"))
         rows.append(row)
     note = "In brackets: not determined by these data. " + _reasons(points) if unsure else ""

@@ -1,12 +1,16 @@
-"""The page's first section: what was asked, what came out, how sure that is."""
+"""The page's first section: what came out, the picture that shows it, what to do next; then how sure that is."""
 
-from thsa_cosim.report.diagnose.verdict import held_out, verdict
+from thsa_cosim.report.diagnose.evidence import evidence
+from thsa_cosim.report.diagnose.verdict import held_out, recordings_table, verdict
 from thsa_cosim.report.folder import Json, Part, Study
-from thsa_cosim.report.parts.comparison import MET, MISSED, noise_ratio, ratio_mark, role_text
-from thsa_cosim.report.parts.content import Block, Cell, Column, Facts, Section, Table, Text
+from thsa_cosim.report.identify.parameters import laws_figure
+from thsa_cosim.report.page.steps import met, next_steps
+from thsa_cosim.report.parts.comparison import MET, MISSED, all_errors, noise_ratio, ratio_mark, role_text
+from thsa_cosim.report.parts.content import Block, Cell, Column, Facts, Figure, Section, Table, Text
 from thsa_cosim.report.parts.failures import evaluations, failed
 from thsa_cosim.report.parts.text import (
     DASH,
+    bound_text,
     count,
     degrees,
     listing,
@@ -20,6 +24,7 @@ from thsa_cosim.report.parts.text import (
     text_cell,
 )
 from thsa_cosim.report.tune.gains import term_label
+from thsa_cosim.report.tune.responses import first_response
 
 _STATUS = {
     "running": "The study is running; this is how far it is. The same command writes the page anew.",
@@ -30,32 +35,68 @@ _STATUS = {
 
 
 def summary(study: Study) -> Section:
-    """The section for any kind of study."""
+    """What came out, the picture that shows it, before and after, and what to do next; for any kind of study."""
     blocks: list[Block] = []
     status = study.status
     if status in _STATUS:
         command = study.whole.about.get("command")
         again = f" Continue with: {command}" if command and status != "running" else ""
         blocks.append(Text(_STATUS[status] + again, "bad" if status == "stopped" else ""))
-    blocks.append(Facts([("asked", text) for text in _asked(study)]))
     started = [part for part in study.parts if part.result is None and part.journal is not None]
     blocks += [Text(f"{part.title}: {_so_far(part)}") for part in started]
-    result = study.whole.result
-    if result is not None:
+    if study.whole.result is None:
+        blocks.append(_question_facts(study))
+    else:
+        blocks += verdict_of(study)
+    steps = next_steps(study)
+    if steps:
+        blocks.append(Facts([("next", text) for text in steps]))
+    return Section("summary", "Summary", tuple(blocks))
+
+
+def details(study: Study) -> Section | None:
+    """What was asked, and how sure the answer is."""
+    asked = () if study.whole.result is None else (_question_facts(study),)
+    sure = Facts([("how sure", text) for text in _sure(study)])
+    notes = [Text(f"Note: {note}") for note in _notes(study)]
+    blocks = (*asked, *((sure,) if sure.items else ()), *notes)
+    return Section("details", "What was asked, and how sure this is", blocks) if blocks else None
+
+
+def _question_facts(study: Study) -> Facts:
+    return Facts([("asked", text) for text in _asked(study)])
+
+
+def verdict_of(study: Study) -> list[Block]:
+    """The verdict in one sentence, the picture that shows it, and the tables that stand behind it."""
+    result, kind = study.whole.result or {}, study.whole.kind
+    blocks: list[Block] = []
+    figure = telling(study)
+    picture: list[Block] = [] if figure is None else [figure]
+    if kind == "diagnose":
+        sentence, *rest = verdict(result)
+        blocks += [sentence, *picture, *recordings_table(result), *rest]
+    elif kind == "tune":
+        sentence, *rest = _tuned(result)
+        blocks += [sentence, *picture, *rest]
+    else:
+        blocks += [met(study), *picture]
         if result.get("points"):
             blocks.append(_found_table(result))
-        if study.whole.kind == "diagnose":
-            blocks += verdict(result)
-        if study.whole.kind == "tune":
-            blocks += _tuned(result)
-        errors = _errors(study)
-        if errors is not None:
-            blocks.append(errors)
-    sure = [*_sure(study)]
-    if sure:
-        blocks.append(Facts([("how sure", text) for text in sure]))
-    blocks += [Text(f"Note: {note}") for note in _notes(study)]
-    return Section("summary", "Summary", tuple(blocks))
+    errors = _errors(study)
+    return blocks if errors is None else [*blocks, errors]
+
+
+def telling(study: Study) -> Figure | None:
+    """The one picture that shows what came out; the sections below leave it out."""
+    result = study.whole.result
+    if result is None:
+        return None
+    if study.whole.kind == "diagnose":
+        return evidence(study.whole)
+    if study.whole.kind == "tune":
+        return first_response(study.whole)
+    return laws_figure(result)
 
 
 def _asked(study: Study) -> list[str]:
@@ -136,7 +177,11 @@ def _found_table(result: Json) -> Table:
             away = (law.get("largest_deviation") or {}).get("points") if known else None
             row += [text_cell(law.get("form", DASH)), Cell(percent(away), away)]
         rows.append(row)
-    note = "Red: not determined by the data." if any(c.mark == "bad" for r in rows for c in r) else ""
+    note = (
+        "Red: not determined by the data, or on a bound of the search."
+        if any(c.mark == "bad" for r in rows for c in r)
+        else ""
+    )
     return Table("What came out: values ± one standard error", columns, rows, note)
 
 
@@ -144,13 +189,16 @@ def _estimate(point: Json, name: str, with_place: bool) -> Cell:
     estimate = point["parameters"][name]
     place = f" at {degrees(point['temperature_degC'])}" if with_place else ""
     text = plus_minus(estimate["value"], estimate["stderr"]) + place
-    return Cell(text, estimate["value"], "" if estimate["identifiable"] else "bad")
+    text += f" ({bound_text(estimate)})" if bound_text(estimate) else ""
+    return Cell(
+        text, estimate["value"], "" if estimate["identifiable"] and not bound_text(estimate) else "bad"
+    )
 
 
 def _tuned(result: Json) -> list[Block]:
     after, before = result.get("after"), result.get("before")
     if not after:
-        return [Text("No gains were found.", "bad")]
+        return [Text("No gains were found.", "lead bad")]
     units: Json = result.get("units", {})
     found = listing([f"{name} = {quantity(v, units.get(name, ''))}" for name, v in after["gains"].items()])
     requirements = result.get("requirements", [])
@@ -161,7 +209,7 @@ def _tuned(result: Json) -> list[Block]:
         if requirements
         else "none were required"
     )
-    blocks: list[Block] = [Text(f"Found: {found}; {kept}.", "good" if feasible else "bad")]
+    blocks: list[Block] = [Text(f"Found: {found}; {kept}.", "lead good" if feasible else "lead bad")]
     terms = [n for n in ("rise_time", "steady_state_error", "overshoot", "settling_time") if n in after]
     if before:
         term_units: Json = result.get("term_units", {})
@@ -204,7 +252,7 @@ def _tuned(result: Json) -> list[Block]:
 def _errors(study: Study) -> Table | None:
     """Rmse against noise per role and channel over the whole study."""
     rows = []
-    for role, name, error in _all_errors(study):
+    for role, name, error in all_errors(study):
         ratio = noise_ratio(error)
         share = error.get("nrmse")
         cells = (significant_cell(error["rmse"]), significant_cell(error.get("noise")))
@@ -232,20 +280,6 @@ def _errors(study: Study) -> Table | None:
     return Table("How well the recordings are met", columns, rows)
 
 
-def _all_errors(study: Study) -> list[tuple[str, str, Json]]:
-    result = study.whole.result or {}
-    found = [(role, n, e) for role, channels in result.get("error", {}).items() for n, e in channels.items()]
-    if found or study.whole.kind != "simulate":
-        return found
-    worst: dict[tuple[str, str], Json] = {}
-    for recording in result.get("recordings", []):
-        for name, error in recording["error"].items():
-            key = recording["role"], name
-            if key not in worst or error["rmse"] > worst[key]["rmse"]:
-                worst[key] = error
-    return [(f"{role_text(role)}, worst recording", name, error) for (role, name), error in worst.items()]
-
-
 def _sure(study: Study) -> list[str]:
     """Sentences on how far the numbers can be trusted."""
     result = study.whole.result
@@ -257,7 +291,7 @@ def _sure(study: Study) -> list[str]:
         sentences.append(_determined(values))
     ratios = [
         (f"{name} ({role_text(role)})", r)
-        for role, name, e in _all_errors(study)
+        for role, name, e in all_errors(study)
         if (r := noise_ratio(e)) is not None
     ]
     if ratios:

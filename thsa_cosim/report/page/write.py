@@ -20,7 +20,7 @@ from thsa_cosim.report.folder import Part, Study, read_study
 from thsa_cosim.report.identify.correlation import correlation
 from thsa_cosim.report.identify.friction import friction
 from thsa_cosim.report.identify.parameters import parameters
-from thsa_cosim.report.page.summary import summary
+from thsa_cosim.report.page.summary import details, summary
 from thsa_cosim.report.parts.comparison import comparison
 from thsa_cosim.report.parts.content import Block, Figure, Fold, Section
 from thsa_cosim.report.parts.convergence import convergence
@@ -101,7 +101,7 @@ def _sections(study: Study) -> list[Section]:
         if study.in_stages and own:
             own.insert(0, Section(f"{part.prefix}part", part.title, (), is_part=True))
         found += [replace(section, group=part.name) for section in own]
-    found += [failures(study.parts), provenance(study)]
+    found += [details(study), failures(study.parts), provenance(study)]
     return [section for section in found if section is not None]
 
 

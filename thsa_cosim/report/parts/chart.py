@@ -65,8 +65,8 @@ def envelope(values: FloatArray, buckets: int = 1250) -> NDArray[np.intp]:
 class Chart:
     """A grid of panels under one legend; ``weights`` give the rows' relative heights.
 
-    Panels are addressed by (row, column) from the top left. With ``shared_x`` the panels of a column zoom
-    together and show tick labels on the lowest alone.
+    Panels are addressed by (row, column) from the top left. With ``shared_x`` the panels of a column have one x axis
+    below the lowest: they zoom together, under one cursor that tells all values.
     """
 
     def __init__(
@@ -109,15 +109,13 @@ class Chart:
                 left = column * (width + side)
                 self._axis(x).update(domain=[left, min(left + width, 1.0)], anchor=y, automargin=True)
                 self._axis(y).update(domain=[bottom, top], anchor=x, automargin=True)
-                if self._shared_x and row < self.rows - 1:
-                    self._axis(x).update(matches=self._names(self.rows - 1, column)[0], showticklabels=False)
             top = bottom - gap
 
     def _names(self, row: int, column: int) -> tuple[str, str]:
-        """Plotly's names of a panel's axes: x, x2, … and y, y2, …"""
+        """Plotly's names of a panel's axes: x, x2, … and y, y2, …; panels that share an x axis lie on the same."""
         number = row * self.columns + column + 1
-        suffix = "" if number == 1 else str(number)
-        return f"x{suffix}", f"y{suffix}"
+        below = column + 1 if self._shared_x else number
+        return f"x{below if below > 1 else ''}", f"y{number if number > 1 else ''}"
 
     def _axis(self, name: str) -> dict[str, Any]:
         axis: dict[str, Any] = self._layout.setdefault(f"{name[0]}axis{name[1:]}", {})
@@ -133,7 +131,9 @@ class Chart:
         for name, letter in ((first, "x"), (second, "y")):
             axis = self._axis(name)
             if options.get(f"log_{letter}"):
-                axis.update(type="log", dtick=options.get(f"dtick_{letter}"), exponentformat="power")
+                axis.update(
+                    type="log", dtick=options.get(f"dtick_{letter}"), exponentformat="power", nticks=6
+                )
             if f"{letter}_range" in options:
                 axis["range"] = list(options[f"{letter}_range"])
             if f"{letter}_options" in options:
@@ -192,6 +192,7 @@ class Chart:
         if style.get("error") is not None:
             bars = packed(np.nan_to_num(np.asarray(style["error"], dtype=np.float64)))
             extra["error_y"] = {"type": "data", "array": bars, "color": marker["color"], "thickness": 1.2}
+            extra["customdata"] = bars
         if style.get("labels") is not None:
             extra["text"] = [plain(text) for text in style["labels"]]
         mode = "lines+markers" if style.get("joined") else "markers"
@@ -247,13 +248,48 @@ class Chart:
             | {"line": line}
         )
 
+    def _hover(self) -> None:
+        """Say a value's unit under the cursor, and where it is on the x axis; stacked panels share the cursor."""
+        for trace in self._data:
+            if trace["type"] not in ("scatter", "bar") or trace.get("hoverinfo") == "skip":
+                continue
+            unit = _unit(self._axis(trace["yaxis"]))
+            error = " ± %{customdata:.2g}" if "customdata" in trace else ""
+            trace.setdefault("hovertemplate", f"%{{y:.5g}}{error}{unit}")
+            if self._shared_x or trace["type"] == "bar":
+                continue
+            name = trace["name"] or "value"
+            title = _title(self._axis(trace["xaxis"]))
+            trace["hovertemplate"] = f"{title} %{{x:.5g}}{_unit(self._axis(trace['xaxis']))}<br>{name} " + (
+                f"{trace['hovertemplate']}<extra></extra>"
+            )
+        if self._shared_x:
+            self._layout |= {"hovermode": "x unified", "hoversubplots": "axis"}
+            for column in range(self.columns):
+                axis = self._axis(self._names(0, column)[0])
+                text = f"{_title(axis)} %{{x:.5g}}{_unit(axis)}"
+                axis.update(showspikes=True, spikemode="across", spikesnap="cursor", spikethickness=1)
+                axis["unifiedhovertitle"] = {"text": text}
+
     def build(self, caption: str, **layout: Any) -> Figure:
         """The finished figure; without a legend it needs less room above."""
+        self._hover()
         if not any(entry["showlegend"] for entry in self._data):
             self.height -= _PIXELS_ABOVE - 32
             self._layout["margin"]["t"] = 32
             self._layout["height"] = self.height
         return Figure(self.name, self._data, {**self._layout, **layout}, self.height, caption)
+
+
+def _title(axis: dict[str, Any]) -> str:
+    """An axis' quantity without its unit."""
+    return str(axis.get("title", {}).get("text", "")).rpartition(" [")[0]
+
+
+def _unit(axis: dict[str, Any]) -> str:
+    """An axis' unit behind a space; nothing for a plain number."""
+    unit = str(axis.get("title", {}).get("text", "")).rpartition(" [")[2].rstrip("]")
+    return "" if unit in ("", "1", "–") else f" {unit}"
 
 
 def limits(values: Sequence[ArrayLike], margin: float = 0.06) -> tuple[float, float] | None:

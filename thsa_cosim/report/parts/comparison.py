@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.folder import Json, Part, Study
 from thsa_cosim.report.parts import chart
 from thsa_cosim.report.parts.chart import Chart
 from thsa_cosim.report.parts.content import Block, Cell, Column, Figure, Fold, Section, Table, Text
@@ -64,6 +64,21 @@ def ratio_mark(ratio: float | None) -> str:
 def noise_ratio(error: Json) -> float | None:
     """The rmse in units of the noise; None without noise."""
     return error["rmse"] / error["noise"] if error.get("noise") else None
+
+
+def all_errors(study: Study) -> list[tuple[str, str, Json]]:
+    """Role, channel and error over the whole study; of a simulate study the worst recording's."""
+    result = study.whole.result or {}
+    found = [(role, n, e) for role, channels in result.get("error", {}).items() for n, e in channels.items()]
+    if found or study.whole.kind != "simulate":
+        return found
+    worst: dict[tuple[str, str], Json] = {}
+    for recording in result.get("recordings", []):
+        for name, error in recording["error"].items():
+            key = recording["role"], name
+            if key not in worst or error["rmse"] > worst[key]["rmse"]:
+                worst[key] = error
+    return [(f"{role_text(role)}, worst recording", name, error) for (role, name), error in worst.items()]
 
 
 def _errors(recordings: list[Json]) -> Table:

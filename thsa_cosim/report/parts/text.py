@@ -2,7 +2,8 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from thsa_cosim.report.parts.content import Cell
 
@@ -27,6 +28,16 @@ def plus_minus(value: float | None, stderr: float | None) -> str:
     decimals = min(max(1 - math.floor(math.log10(error)), 0), 9)
     text = f"{scaled:.{decimals}f} ± {error:.{decimals}f}"
     return text if shift == 0 else f"({text})e{shift}"
+
+
+def bound_text(estimate: Mapping[str, Any]) -> str:
+    """``at its upper bound`` for a value within a thousandth of the searched range of one, else nothing."""
+    low, high, value = estimate.get("lower"), estimate.get("upper"), estimate.get("value")
+    if low is None or high is None or value is None or not high > low:
+        return ""
+    logarithmic = low > 0.0 and high > 30.0 * low and value > 0.0
+    place = math.log(value / low) / math.log(high / low) if logarithmic else (value - low) / (high - low)
+    return "at its lower bound" if place < 1e-3 else "at its upper bound" if place > 1.0 - 1e-3 else ""
 
 
 def percent(share: float | None, digits: int = 2) -> str:

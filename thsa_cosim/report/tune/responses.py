@@ -14,13 +14,22 @@ COMMAND = "command"
 def responses(part: Part) -> Section | None:
     """The section; None before the responses were simulated."""
     found = [read_signals(path) for path in signal_paths(part.folder)]
-    if not found:
+    if len(found) < 2:
         return None
     folds: list[Block] = []
-    for k, one in enumerate(found):
+    for k, one in list(enumerate(found))[1:]:  # the summary shows the first
         figure = _figure(f"{part.prefix}response-{file_name(one.name)}", one)
         folds.append(Fold(one.name, (figure,), is_open=k in (0, len(found) - 1)))
     return Section(f"{part.prefix}responses", "Responses", tuple(folds))
+
+
+def first_response(part: Part) -> Figure | None:
+    """The response under the first condition; None before the responses were simulated."""
+    paths = signal_paths(part.folder)
+    if not paths:
+        return None
+    first = read_signals(paths[0])
+    return _figure(f"{part.prefix}response-{file_name(first.name)}", first)
 
 
 def set_colours(names: Iterable[str]) -> dict[str, str]:

@@ -65,6 +65,7 @@ EFFECT = Effect(
                     lower=1.0,
                     upper=60.0,
                     starts=(3.0, 6.0, 9.0, 13.0, 18.0, 25.0),
+                    scanned=True,
                 ),
             ),
             slots=("screw", "guide"),

@@ -36,6 +36,7 @@ def _parameters(s: str, c: str, dimension: str, typical: float) -> tuple[EffectP
 
 _PLACES = ("gearbox", "guide")
 EFFECT = Effect(
+    part="screw",
     name="screw-ripple",
     title="Ripple of the screw with its angle",
     physics="torque, share of the load's torque or friction a sin(n phi_g + phase), or a lead error of the same form",

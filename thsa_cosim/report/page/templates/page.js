@@ -33,10 +33,50 @@
       yaxis: axis,
     };
   };
+  // ---- on a narrow screen panels stand below each other, each as wide as the screen ----
+  const NARROW = 640;
+  const stack = (figure) => {
+    const layout = figure.layout;
+    const panels = Object.keys(layout).filter((key) => /^yaxis\d*$/.test(key)).map((key) => {
+      const y = layout[key];
+      const x = layout["xaxis" + (y.anchor || "x").slice(1)];
+      return { x, y, used: figure.data.some((trace) => (trace.yaxis || "y") === key.replace("axis", "")) };
+    }).filter((panel) => panel.x && panel.x.domain && panel.y.domain);
+    const columns = new Set(panels.map((panel) => panel.x.domain[0])).size;
+    const named = figure.data.filter((trace) => trace.showlegend).length;
+    const legend = 22 * named;  // one name a line, at worst
+    Object.assign(layout.margin, { l: 64, r: 12 });
+    if (named) layout.margin.t = 40 + legend;
+    if (columns > 1) {
+      const shown = panels.filter((panel) => panel.used);
+      shown.sort((a, b) => b.y.domain[1] - a.y.domain[1] || a.x.domain[0] - b.x.domain[0]);
+      const [high, gap] = [190, 84];
+      const total = shown.length * high + (shown.length - 1) * gap;
+      shown.forEach((panel, k) => {
+        const top = 1 - (k * (high + gap)) / total;
+        panel.x.domain = [0, 1];
+        panel.y.domain = [Math.max(0, top - high / total), top];
+      });
+      for (const panel of panels) if (!panel.used) { panel.x.visible = false; panel.y.visible = false; }
+      layout.height = total + layout.margin.t + layout.margin.b + 8;
+    } else {
+      layout.height += named ? legend : 0;
+    }
+    if (layout.legend) Object.assign(layout.legend, { orientation: "v", yref: "container", y: 1, yanchor: "top" });
+    for (const axis of panels.flatMap((panel) => [panel.x, panel.y])) axis.nticks = 5;
+    for (const axis of panels.map((panel) => panel.x)) delete axis.dtick;
+    for (const note of layout.annotations || []) {
+      note.font = { size: 11 };
+      if (note.text.length > 44) note.text = note.text.replace(", ", ",<br>");
+    }
+    if ((layout.annotations || []).some((note) => note.text.includes("<br>"))) layout.margin.t += 16;
+  };
   const draw = (place) => {
     const styles = getComputedStyle(root);
     const figure = resolve(figures[place.id], styles);
     figure.layout.template = { layout: theme(styles) };
+    if (!root.classList.contains("printing") && place.clientWidth < NARROW) stack(figure);
+    place.style.height = `${figure.layout.height}px`;
     if (root.classList.contains("printing")) figure.layout.width = PAPER_WIDTH;
     drawn.add(place);
     const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
@@ -60,6 +100,7 @@
       if (fold.open) idle(drawNext);
     });
   }
+  matchMedia(`(max-width: ${NARROW}px)`).addEventListener("change", () => drawn.forEach(draw));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawn.forEach(draw));
 
   // ---- paper is white and shows everything ----

@@ -1,14 +1,13 @@
-"""From the TOML file to a :class:`Scenario`: files found and read, units converted, everything checked."""
+"""From the file to a :class:`Scenario`, which has recordings: files read, units converted, everything checked."""
 
-import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from thsa_cosim.errors import InputError, ScenarioError, did_you_mean, did_you_mean_path
+from thsa_cosim.errors import InputError, ScenarioError, did_you_mean
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Column, Recording, TimeAxis, read_recording
@@ -26,11 +25,12 @@ from thsa_cosim.scenario.model import (
 from thsa_cosim.scenario.recording_schema import TemperatureTable
 from thsa_cosim.scenario.schema import KINDS, CommonTable, DiagnoseTable, IdentifyTable, SimulateTable
 from thsa_cosim.scenario.sentences import from_validation, one_line
+from thsa_cosim.scenario.source import Source, about_kind, read_source
 from thsa_cosim.scenario.system import open_model
 
 
 def load_scenario(
-    path: Path | str,
+    source: Source,
     *,
     fit: Sequence[Path | str] = (),
     validate: Sequence[Path | str] = (),
@@ -41,8 +41,8 @@ def load_scenario(
 
     Parameters
     ----------
-    path
-        The TOML file; paths in it are relative to it.
+    source
+        The TOML file, to which paths in it are relative; or its content (see ``Source``).
     fit, validate
         Recordings (or globs, relative to the working directory) instead of the scenario's own.
     seed
@@ -57,8 +57,7 @@ def load_scenario(
     FmuError, RecordingError, ParameterError, UnitError, MissingExtraError
         As the files that it names deserve. Every message is one line.
     """
-    path = Path(path)
-    data = read_toml(path)
+    path, data = read_source(source)
     table = parse(path, data)
     try:
         return _resolve(path, table, fit, validate, seed, fmu)
@@ -67,48 +66,19 @@ def load_scenario(
         raise type(error)(one_line(message)) from None
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Return the file's tables; ScenarioError if it is missing or no TOML."""
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        near = did_you_mean_path(path)
-        raise ScenarioError(one_line(f"{path}: no such scenario file; check the path.{near}")) from None
-    except UnicodeDecodeError:
-        raise ScenarioError(one_line(f"{path}: is not UTF-8 text; save it as UTF-8.")) from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise ScenarioError(one_line(f"{path}: cannot be read ({reason}).")) from None
-    try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise ScenarioError(one_line(f"{path}: is no valid TOML ({error}); correct it.")) from None
-
-
 def parse(path: Path, data: Mapping[str, Any]) -> CommonTable:
     """Return the tables as their kind's pydantic model; ScenarioError in one sentence."""
     kind = data.get("kind")
     if kind == "tune":
         raise ScenarioError(one_line(f"{path}: kind is 'tune': run 'thsa-cosim tune {path}'."))
     if not isinstance(kind, str) or kind not in KINDS:
-        what, hint = about_kind(data, KINDS)
-        supported = " or ".join(f'"{k}"' for k in KINDS)
+        what, hint = about_kind(data, [*KINDS, "tune"])
+        supported = " or ".join(f'"{k}"' for k in (*KINDS, "tune"))
         raise ScenarioError(one_line(f"{path}: kind {what}; supported kinds are {supported}.{hint}"))
     try:
         return KINDS[kind].model_validate(data)
     except ValidationError as error:
         raise from_validation(path, data, error) from None
-
-
-def about_kind(data: Mapping[str, Any], known: Iterable[str]) -> tuple[str, str]:
-    """Return what is wrong with ``kind``, which is none of ``known``, and a hint at what was meant."""
-    kind = data.get("kind")
-    if kind is not None:
-        return f"is {kind!r}", did_you_mean(kind, known) if isinstance(kind, str) else ""
-    misspelt = next((k for k in data if did_you_mean(k, ["kind"])), None)
-    if misspelt is None:
-        return "is missing", ""
-    return f"is missing ({misspelt!r} is no key)", did_you_mean(misspelt, ["kind"])
 
 
 def _resolve(

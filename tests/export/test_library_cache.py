@@ -1,0 +1,87 @@
+"""Compiled libraries are kept by their sources: the next export of the same model starts no compiler."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from thsa_cosim.errors import ThsaCosimError
+from thsa_cosim.export import compile as compiling
+from thsa_cosim.export.compile import PLATFORMS, compile_library
+
+
+@pytest.fixture
+def compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[list[str]]:
+    """A compiler that writes what it is called with; the commands that it got."""
+    commands: list[list[str]] = []
+
+    def run(command: list[str], *, cwd: Path, **_: object) -> subprocess.CompletedProcess[str]:
+        commands.append(command)
+        content = b"".join(sorted(path.read_bytes() for path in cwd.glob("*.c")))
+        if b"#error" in content:
+            return subprocess.CompletedProcess(command, 1, "", "model.c:1: error: no")
+        Path(command[command.index("-o") + 1]).write_bytes(content)
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    monkeypatch.setattr(compiling.subprocess, "run", run)
+    monkeypatch.setattr(compiling, "compiler_version", lambda: "1.0")
+    monkeypatch.setenv("THSA_COSIM_CACHE", str(tmp_path / "cache"))
+    return commands
+
+
+def sources(folder: Path, **files: str) -> Path:
+    folder.mkdir(exist_ok=True)
+    for name, text in files.items():
+        (folder / name.replace("_", ".")).write_text(text)
+    return folder
+
+
+def test_the_same_sources_are_compiled_once(compiler: list[list[str]], tmp_path: Path) -> None:
+    first = sources(tmp_path / "first", model_c="int a;", model_h="int h;")
+    second = sources(tmp_path / "second", model_c="int a;", model_h="int h;")
+    for number, folder in enumerate((first, second, first)):
+        compile_library(folder, ["model.c"], PLATFORMS[0], tmp_path / f"{number}.so")
+        assert (tmp_path / f"{number}.so").read_bytes() == b"int a;"
+    assert len(compiler) == 1
+
+
+def test_a_changed_header_platform_or_compiler_is_compiled_anew(
+    compiler: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = sources(tmp_path / "model", model_c="int a;", model_h="int h;")
+    compile_library(folder, ["model.c"], PLATFORMS[0], tmp_path / "0.so")
+    compile_library(folder, ["model.c"], PLATFORMS[1], tmp_path / "1.dll")
+    sources(folder, model_h="int g;")
+    compile_library(folder, ["model.c"], PLATFORMS[0], tmp_path / "2.so")
+    monkeypatch.setattr(compiling, "compiler_version", lambda: "1.1")
+    compile_library(folder, ["model.c"], PLATFORMS[0], tmp_path / "3.so")
+    assert len(compiler) == 4
+
+
+def test_what_failed_is_not_kept(compiler: list[list[str]], tmp_path: Path) -> None:
+    folder = sources(tmp_path / "model", model_c="#error")
+    for _ in range(2):
+        with pytest.raises(ThsaCosimError, match=r"failed for x86_64-linux-gnu.2.17: model\.c:1"):
+            compile_library(folder, ["model.c"], PLATFORMS[0], tmp_path / "0.so")
+    assert len(compiler) == 2
+
+
+def test_a_cache_that_cannot_be_written_is_none(
+    compiler: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("THSA_COSIM_CACHE", str(tmp_path / "file"))
+    folder = sources(tmp_path / "model", model_c="int a;")
+    for number in range(2):
+        compile_library(folder, ["model.c"], PLATFORMS[0], tmp_path / f"{number}.so")
+    assert len(compiler) == 2
+
+
+def test_the_oldest_go_first(
+    compiler: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiling, "KEPT", 2)
+    for number in range(4):
+        folder = sources(tmp_path / "model", model_c=f"int a{number};")
+        compile_library(folder, ["model.c"], PLATFORMS[0], tmp_path / "0.so")
+    assert len(list((tmp_path / "cache" / "libraries").iterdir())) == 2

@@ -1,0 +1,247 @@
+"""The log of runs: exact, torn at worst at its end, never in doubt about what a run was, and free of machine faults."""
+
+import errno
+import random
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thsa_cosim.batch import Experiment, Job, Outcome, Status
+from thsa_cosim.errors import InputError, MachineError
+from thsa_cosim.scenario import SimulationSpec
+from thsa_cosim.signals import Signals
+from thsa_cosim.study import Place, Study, runs
+from thsa_cosim.study.runs import RUNS, LoggedRunner, RunLog
+
+TIME = np.linspace(0.0, 1.0, 11)
+KEY = b"k" * 16
+
+
+def outcome(seed: int = 0, status: Status = Status.OK) -> Outcome:
+    rng = np.random.default_rng(seed)
+    if status is not Status.OK:
+        return Outcome(status, "why not: α", None, None, 0.25, "console\n")
+    signals = Signals(
+        TIME, {"y": rng.normal(size=11), "u": rng.normal(size=11)}, {"y": "m/s"}, frozenset({"u"})
+    )
+    return Outcome(status, "", signals, rng.normal(size=3), 0.1 + seed)
+
+
+def same(one: Outcome | None, other: Outcome) -> bool:
+    """Bit for bit, units and held signals included."""
+    assert one is not None
+    facts = [(o.status, o.reason, o.duration_s, o.console) for o in (one, other)]
+    arrays = [[a.tobytes() for a in runs._arrays(o)] for o in (one, other)]
+    kept = [
+        None if o.signals is None else (o.signals.names, o.signals.units, o.signals.held)
+        for o in (one, other)
+    ]
+    return facts[0] == facts[1] and arrays[0] == arrays[1] and kept[0] == kept[1]
+
+
+class Counting:
+    """A runner that makes an outcome of the job's values and notes what it ran; it may stop in the midst."""
+
+    notes: Sequence[str] = ()
+
+    def __init__(self, stop_after: int = 10**9) -> None:
+        self.ran: list[tuple[str, dict[str, float]]] = []
+        self.stop_after = stop_after
+
+    def run(self, jobs: Sequence[Job], on_outcome: Any = None) -> list[Outcome]:
+        found = []
+        for index, job in enumerate(jobs):
+            if len(self.ran) >= self.stop_after:
+                raise KeyboardInterrupt
+            self.ran.append((job.experiment, dict(job.values)))
+            found.append(outcome(int(job.values["seed"])))
+            if on_outcome is not None:
+                on_outcome(index, found[-1])
+        return found
+
+    def close(self) -> None:
+        pass
+
+    def __enter__(self) -> "Counting":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+@pytest.fixture
+def experiment(tmp_path: Path) -> Experiment:
+    fmu = tmp_path / "Model.fmu"
+    fmu.write_bytes(b"an archive")
+    return Experiment("fit/a", fmu, Signals(TIME, {"u": TIME}), ("y",), TIME, {"tau": 0.1}, 1e-6)
+
+
+def test_what_is_read_is_what_was_written(tmp_path: Path) -> None:
+    kept = {bytes([k]) * 16: outcome(k) for k in range(5)}
+    kept[b"f" * 16] = outcome(status=Status.CRASH)
+    kept[b"s" * 16] = replace(outcome(7), signals=None)
+    with RunLog.open(tmp_path / RUNS) as log:
+        for key, value in kept.items():
+            log.append(key, value)
+    with RunLog.open(tmp_path / RUNS) as log:
+        assert len(log) == len(kept)
+        assert all(same(log.known(key), value) for key, value in kept.items())
+        assert log.known(b"x" * 16) is None
+
+
+def test_a_torn_end_is_dropped_wherever_it_is_torn(tmp_path: Path) -> None:
+    with RunLog.open(tmp_path / RUNS) as log:
+        for k in range(4):
+            log.append(bytes([k]) * 16, outcome(k))
+    whole, chance = (tmp_path / RUNS).read_bytes(), random.Random(3)
+    for _ in range(60):
+        (tmp_path / RUNS).write_bytes(whole[: chance.randrange(len(whole))] + chance.choice([b"", b"\0" * 9]))
+        try:
+            log = RunLog.open(tmp_path / RUNS)
+        except InputError:  # torn within the first line, and zeros after it
+            continue
+        with log:
+            known = [k for k in range(4) if log.known(bytes([k]) * 16) is not None]
+            assert known == list(range(len(known)))
+            assert all(same(log.known(bytes([k]) * 16), outcome(k)) for k in known)
+            log.append(KEY, outcome(9))
+        with RunLog.open(tmp_path / RUNS) as log:
+            assert same(log.known(KEY), outcome(9))
+
+
+def test_a_flipped_bit_is_no_outcome(tmp_path: Path) -> None:
+    with RunLog.open(tmp_path / RUNS) as log:
+        log.append(KEY, outcome())
+    content = bytearray((tmp_path / RUNS).read_bytes())
+    content[-5] ^= 1
+    (tmp_path / RUNS).write_bytes(content)
+    with RunLog.open(tmp_path / RUNS) as log:
+        assert log.known(KEY) is None
+
+
+def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
+    with RunLog.open(tmp_path / RUNS), pytest.raises(InputError, match="is in use by another run"):
+        RunLog.open(tmp_path / RUNS)
+
+
+def test_a_machines_fault_is_never_kept(tmp_path: Path) -> None:
+    with RunLog.open(tmp_path / RUNS) as log:
+        log.append(KEY, outcome(status=Status.MACHINE))
+        assert log.known(KEY) is None
+
+
+def test_a_full_disk_names_the_folder_and_tears_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with RunLog.open(tmp_path / RUNS) as log:
+        log.append(KEY, outcome(1))
+        file = log._file
+
+        class Full:
+            def write(self, data: bytes) -> int:
+                file.write(bytes(data)[:7])
+                raise OSError(errno.ENOSPC, "No space left on device")
+
+            def __getattr__(self, name: str) -> Any:
+                return getattr(file, name)
+
+        log._file = Full()  # type: ignore[assignment]
+        with pytest.raises(
+            MachineError, match=r"cannot be written .*make room.*same command again"
+        ) as caught:
+            log.append(b"m" * 16, outcome(2))
+        assert str(tmp_path) in str(caught.value)
+    with RunLog.open(tmp_path / RUNS) as log:
+        assert same(log.known(KEY), outcome(1))
+        assert log.known(b"m" * 16) is None
+
+
+def test_large_outcomes_are_kept_as_far_as_that_is_cheaper(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runs, "BASE", 10_000)
+    monkeypatch.setattr(runs, "PER_SECOND", 100_000)
+    large = Outcome(Status.OK, reduced=np.zeros(1000), duration_s=1e-3)
+    with RunLog.open(tmp_path / RUNS) as log:
+        for k in range(10):
+            log.append(bytes([k]) * 16, large)
+        assert len(log) == 1
+        log.append(b"t" * 16, replace(large, duration_s=1.0))
+        log.append(b"u" * 16, large)
+        assert len(log) == 3
+        log.append(b"v" * 16, Outcome(Status.OK, reduced=np.zeros(5)))
+        assert log.known(b"v" * 16) is not None
+
+
+def test_only_what_is_not_known_is_run(tmp_path: Path, experiment: Experiment) -> None:
+    jobs = [Job("fit/a", {"seed": float(k)}) for k in range(6)]
+    first, second = Counting(stop_after=4), Counting()
+    with RunLog.open(tmp_path / RUNS) as log, pytest.raises(KeyboardInterrupt):
+        LoggedRunner(first, log, [experiment], ()).run(jobs)
+    told: list[int] = []
+    with RunLog.open(tmp_path / RUNS) as log:
+        found = LoggedRunner(second, log, [experiment], ()).run(jobs, lambda index, _: told.append(index))
+        assert log.recalled == 4
+    assert [values["seed"] for _, values in second.ran] == [4.0, 5.0]
+    assert sorted(told) == list(range(6))
+    assert all(same(one, outcome(k)) for k, one in enumerate(found))
+
+
+def changed_experiments(experiment: Experiment) -> dict[str, Experiment]:
+    other = experiment.fmu.with_name("Other.fmu")
+    other.write_bytes(b"another archive")
+    return {
+        "fmu": replace(experiment, fmu=other),
+        "inputs": replace(experiment, inputs=Signals(TIME, {"u": TIME + 1.0})),
+        "no inputs": replace(experiment, inputs=None),
+        "outputs": replace(experiment, outputs=("y", "u")),
+        "time": replace(experiment, time=TIME[:-1]),
+        "fixed": replace(experiment, fixed={"tau": 0.2}),
+        "tolerance": replace(experiment, tolerance=1e-5),
+        "reduce": replace(experiment, reduce=len),  # type: ignore[arg-type]
+    }
+
+
+@pytest.mark.parametrize(
+    "what", ["fmu", "inputs", "no inputs", "outputs", "time", "fixed", "tolerance", "reduce"]
+)
+def test_another_run_is_not_looked_up(tmp_path: Path, experiment: Experiment, what: str) -> None:
+    job, other = Job("fit/a", {"seed": 1.0}), changed_experiments(experiment)[what]
+    with RunLog.open(tmp_path / RUNS) as log:
+        LoggedRunner(Counting(), log, [experiment], ()).run([job])
+        for changed, settings in ((other, ()), (experiment, ("model-exchange",))):
+            again = Counting()
+            LoggedRunner(again, log, [changed], settings).run([job])
+            assert len(again.ran) == 1
+        again = Counting()
+        runner = LoggedRunner(again, log, [experiment], ())
+        runner.run([Job("fit/a", {"seed": 2.0}), replace(job, keep_signals=True), job])
+        assert len(again.ran) == 2
+
+
+def test_where_the_fmu_lies_does_not_matter(tmp_path: Path, experiment: Experiment) -> None:
+    copy = tmp_path / "copy.fmu"
+    copy.write_bytes(experiment.fmu.read_bytes())
+    again = Counting()
+    with RunLog.open(tmp_path / RUNS) as log:
+        LoggedRunner(Counting(), log, [experiment], ()).run([Job("fit/a", {"seed": 1.0})])
+        LoggedRunner(again, log, [replace(experiment, fmu=copy)], ()).run([Job("fit/a", {"seed": 1.0})])
+    assert again.ran == []
+
+
+def test_a_complete_study_keeps_no_log(tmp_path: Path, experiment: Experiment) -> None:
+    class Executor:
+        def open_runner(self, spec: Any, experiments: Any) -> Counting:
+            return Counting()
+
+    place = Place(tmp_path / "study", Executor())  # type: ignore[arg-type]
+    with Study.open(place, {"kind": "simulate"}, {}) as study:
+        with study.open_runner(SimulationSpec(), [experiment]) as runner:
+            runner.run([Job("fit/a", {"seed": 1.0})])
+        assert (place.folder / RUNS).stat().st_size > 100
+        study.complete()
+    assert not (place.folder / RUNS).exists()

@@ -1,0 +1,51 @@
+"""The picture that argues for a verdict: what is missing, over its cause, with what both models say of it."""
+
+import math
+
+import numpy as np
+
+from thsa_cosim.report.diagnose.structure import clearest
+from thsa_cosim.report.folder import Json, Part
+from thsa_cosim.report.parts.chart import AFTER, BEFORE, INK, Chart
+from thsa_cosim.report.parts.comparison import role_text
+from thsa_cosim.report.parts.content import Figure
+from thsa_cosim.report.parts.text import percent
+from thsa_cosim.signals import FloatArray
+
+_QUANTITIES = {"A": "current", "V": "voltage", "N": "force", "N.m": "torque", "W": "power", "m/s": "speed"}
+"""What a residual is, by its unit."""
+
+
+def evidence(part: Part) -> Figure | None:
+    """What the balance at fault misses, over its cause; else the clearest dependence of a residual; else None."""
+    found: Json | None = (part.result or {}).get("evidence")
+    if not found:
+        return clearest(part)
+    quantity = _QUANTITIES.get(found["unit"], "quantity")
+    drawn = Chart(f"{part.prefix}evidence", row_height=340)
+    bins = {name: _column(values) for name, values in found["bins"].items()}
+    added = [str(e["name"]) for e in (part.result or {}).get("effects", [])]
+    labels = {
+        "before": "declared model",
+        "after": f"model with {' and '.join(added)}" if added else "fitted model",
+    }
+    for name, colour, dash in (("before", BEFORE, "dash"), ("after", AFTER, "solid")):
+        if np.isfinite(bins[name]).any():
+            drawn.line(bins["at"], bins[name], labels[name], colour=colour, dash=dash, width=2.2)
+    error = 1.96 * bins["stderr"]
+    drawn.points(bins["at"], bins["measured"], "measured", colour=INK, size=6, error=error)
+    drawn.level(0.0)
+    drawn.axes(
+        x=f"{found['cause']} [{found['cause_unit']}]",
+        y=f"missing {quantity}, balance “{found['equation']}” [{found['unit']}]",
+    )
+    return drawn.build(
+        f"What the balance “{found['equation']}” leaves open in {found['left']} over {found['cause']}, on"
+        f" {role_text(found['part']).replace(' ', '-')} recordings: means in bins with 95 % intervals, and what"
+        " either model puts there."
+        f" {percent(found['share'])} of it depends on {found['cause']}. Re-tuning explains none of what is shown."
+    )
+
+
+def _column(values: list[float | None]) -> FloatArray:
+    return np.array([math.nan if v is None else v for v in values], dtype=np.float64)

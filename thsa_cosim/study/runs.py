@@ -1,0 +1,285 @@
+"""The log of a study's runs: what was simulated once is not simulated again, whatever ended the study.
+
+The file holds one record per run: a frame (length and checksum), the run's key, what became of it. A key is a digest
+of all that decides the outcome: the FMU's archive, inputs, times, start values, solver settings, and what the worker
+makes of the signals. A kill tears the last record at most, which is dropped when the log is opened again.
+
+Large outcomes (signals, residuals) are kept only as far as that is cheaper than running again, see ``BASE`` and
+``PER_SECOND``. Timing apart, a recalled outcome is bit for bit the one that was returned.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+import pickle
+import struct
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Self
+
+import numpy as np
+
+from thsa_cosim.batch import Experiment, Job, Outcome, Runner, Status
+from thsa_cosim.batch.runner import OnOutcome
+from thsa_cosim.errors import InputError, MachineError
+from thsa_cosim.signals import Signals
+
+RUNS = "runs.log"
+#: So many bytes may be kept in any case, and so many more for every second of simulation that is kept.
+BASE, PER_SECOND = 256_000_000, 1_000_000
+#: Outcomes up to this size (cost terms, say) are always kept.
+SMALL = 2_000
+_MAGIC = b"thsa-cosim runs 1\n"
+_FRAME = struct.Struct("<II")
+_KEY = 16
+
+
+class RunLog:
+    """Outcomes by key, in a file that only grows; a context manager."""
+
+    def __init__(self, path: Path, file: BinaryIO) -> None:
+        """``RunLog.open`` is the way in."""
+        self.path = path
+        self.recalled = 0
+        """Outcomes that were looked up."""
+        self._file = file
+        self._at: dict[bytes, tuple[int, int]] = {}
+        self._end = 0
+        self._seconds = 0.0
+
+    @classmethod
+    def open(cls, path: Path) -> "RunLog":
+        """Open or create the log; InputError if another run uses it, or it is no log."""
+        file = path.open("a+b", buffering=0)
+        try:
+            _lock(path, file)
+            log = cls(path, file)
+            log._load()
+        except BaseException:
+            file.close()
+            raise
+        return log
+
+    def __len__(self) -> int:
+        return len(self._at)
+
+    def known(self, key: bytes) -> Outcome | None:
+        """Return the outcome of exactly this run, or None."""
+        found = self._at.get(key)
+        if found is None:
+            return None
+        self.recalled += 1
+        return _decoded(os.pread(self._file.fileno(), found[1], found[0]))
+
+    def append(self, key: bytes, outcome: Outcome) -> None:
+        """Keep an outcome, unless it is so large that running again is cheaper.
+
+        MachineError if it cannot be written; the log is then as it was before. A machine's fault is no outcome.
+        """
+        if outcome.status is Status.MACHINE:
+            return
+        size = sum(a.nbytes for a in _arrays(outcome))
+        allowed = BASE + PER_SECOND * (self._seconds + outcome.duration_s)
+        if key in self._at or (size > SMALL and self._end + size > allowed):
+            return
+        content = _encoded(outcome)
+        record = key + content
+        data = memoryview(_FRAME.pack(len(record), zlib.crc32(record)) + record)
+        begin = self._end
+        try:
+            while data:
+                data = data[self._file.write(data) :]
+        except OSError as error:
+            self._file.truncate(begin)
+            raise MachineError(
+                f"The study folder {self.path.parent} cannot be written ({error.strerror}); repair that, or make room,"
+                " and give the same command again."
+            ) from None
+        self._end = begin + _FRAME.size + len(record)
+        self._at[key] = (self._end - len(content), len(content))
+        self._seconds += outcome.duration_s
+
+    def remove(self) -> None:
+        """Remove the file: the study is complete."""
+        self.close()
+        self.path.unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """Close the file and release its lock."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _load(self) -> None:
+        size = os.fstat(self._file.fileno()).st_size
+        head = os.pread(self._file.fileno(), len(_MAGIC), 0)
+        if head != _MAGIC[: len(head)]:
+            raise InputError(f"{self.path} is no log of runs; delete it, or choose another folder with -o.")
+        if len(head) < len(_MAGIC):
+            self._file.truncate(0)
+            self._file.write(_MAGIC)
+            self._end = len(_MAGIC)
+            return
+        self._end = len(_MAGIC)
+        with self.path.open("rb") as reader:
+            reader.seek(self._end)
+            while (frame := reader.read(_FRAME.size)) and len(frame) == _FRAME.size:
+                length, check = _FRAME.unpack(frame)
+                record = reader.read(length) if length <= size - self._end else b""
+                if len(record) < max(length, _KEY) or zlib.crc32(record) != check:
+                    break
+                start = self._end + _FRAME.size + _KEY
+                self._at[record[:_KEY]] = (start, length - _KEY)
+                self._end = start + length - _KEY
+                self._seconds += _meta(record[_KEY:])[0]["duration_s"]
+        if self._end < size:
+            self._file.truncate(self._end)
+
+
+class LoggedRunner:
+    """A runner whose outcomes are kept in a log and looked up there; see ``Runner``."""
+
+    def __init__(self, runner: Runner, log: RunLog, experiments: Sequence[Experiment], settings: Any) -> None:
+        """``settings``: what else decides how an experiment is run."""
+        self.notes = runner.notes
+        self._runner = runner
+        self._log = log
+        archives: dict[Path, str] = {}
+        self._keys = {e.name: _experiment_key(e, settings, archives) for e in experiments}
+
+    def run(self, jobs: Sequence[Job], on_outcome: OnOutcome | None = None) -> list[Outcome]:
+        """Look up what is known, run the rest; outcomes come in the order of the jobs."""
+        jobs = list(jobs)
+        keys = [_job_key(self._keys.get(job.experiment, b""), job) for job in jobs]
+        outcomes: list[Outcome | None] = [self._log.known(key) for key in keys]
+        missing = [index for index, outcome in enumerate(outcomes) if outcome is None]
+        if on_outcome is not None:
+            for index, outcome in enumerate(outcomes):
+                if outcome is not None:
+                    on_outcome(index, outcome)
+
+        def note(position: int, outcome: Outcome) -> None:
+            index = missing[position]
+            self._log.append(keys[index], outcome)
+            if on_outcome is not None:
+                on_outcome(index, outcome)
+
+        if missing:
+            found = self._runner.run([jobs[index] for index in missing], note)
+            for index, outcome in zip(missing, found, strict=True):
+                outcomes[index] = outcome
+        return [outcome for outcome in outcomes if outcome is not None]
+
+    def close(self) -> None:
+        """Close the runner; the log stays open."""
+        self._runner.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+# -- keys ---------------------------------------------------------------------------------------------
+def _experiment_key(experiment: Experiment, settings: Any, archives: dict[Path, str]) -> bytes:
+    if experiment.fmu not in archives:
+        try:
+            archives[experiment.fmu] = hashlib.sha256(experiment.fmu.read_bytes()).hexdigest()
+        except OSError:
+            archives[experiment.fmu] = ""  # its runs fail, and say why
+    # Equal objects may pickle differently, which costs a run; different ones never pickle alike.
+    what = (experiment.inputs, experiment.outputs, experiment.time, dict(experiment.fixed))
+    how = (experiment.tolerance, experiment.reduce, experiment.wrapper, settings)
+    data = pickle.dumps((archives[experiment.fmu], what, how), pickle.HIGHEST_PROTOCOL)
+    return hashlib.sha256(data).digest()
+
+
+def _job_key(experiment: bytes, job: Job) -> bytes:
+    digest = hashlib.sha256(experiment)
+    for name in sorted(job.values):
+        digest.update(f"{name}\0".encode() + struct.pack("<d", job.values[name]))
+    digest.update(b"signals" if job.keep_signals else b"")
+    return digest.digest()[:_KEY]
+
+
+# -- records ------------------------------------------------------------------------------------------
+def _arrays(outcome: Outcome) -> list[np.ndarray]:
+    signals = outcome.signals
+    own = [] if signals is None else [signals.time, *(signals[name] for name in signals.names)]
+    return own if outcome.reduced is None else [*own, outcome.reduced]
+
+
+def _encoded(outcome: Outcome) -> bytes:
+    signals, reduced = outcome.signals, outcome.reduced
+    meta: dict[str, Any] = {
+        "status": str(outcome.status),
+        "reason": outcome.reason,
+        "duration_s": outcome.duration_s,
+        "console": outcome.console,
+        "reduced": None if reduced is None else list(reduced.shape),
+    }
+    if signals is not None:
+        meta["signals"] = {"names": list(signals.names), "units": dict(signals.units)}
+        meta["signals"] |= {"held": sorted(signals.held), "n": signals.time.size}
+    head = json.dumps(meta).encode()
+    body = b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in _arrays(outcome))
+    return struct.pack("<I", len(head)) + head + body
+
+
+def _meta(content: bytes) -> tuple[dict[str, Any], int]:
+    (length,) = struct.unpack_from("<I", content)
+    return json.loads(content[4 : 4 + length]), 4 + length
+
+
+def _decoded(content: bytes) -> Outcome:
+    meta, begin = _meta(content)
+    numbers = np.frombuffer(content, dtype="<f8", offset=begin).astype(np.float64)
+    signals, position = None, 0
+    if (kept := meta.get("signals")) is not None:
+        n = kept["n"]
+        columns = [numbers[k * n : (k + 1) * n] for k in range(len(kept["names"]) + 1)]
+        signals = Signals(
+            columns[0],
+            dict(zip(kept["names"], columns[1:], strict=True)),
+            kept["units"],
+            frozenset(kept["held"]),
+        )
+        position = n * len(columns)
+    shape = meta["reduced"]
+    return Outcome(
+        Status(meta["status"]),
+        meta["reason"],
+        signals,
+        None if shape is None else numbers[position:].reshape(shape),
+        meta["duration_s"],
+        meta["console"],
+    )
+
+
+def _lock(path: Path, file: BinaryIO) -> None:
+    """Keep a second process out of the same study (where the system has flock)."""
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise InputError(
+            f"{path.parent} is in use by another run; wait for it or choose another folder with -o."
+        ) from None
+    except OSError:
+        with contextlib.suppress(OSError):  # some network file systems have no locks
+            fcntl.flock(file, fcntl.LOCK_UN)

@@ -1,10 +1,9 @@
-"""Free steps against steps from sample to sample, on every shipped scenario: CPU, errors in noise, events, side by side.
+"""Free steps against steps from sample to sample on every shipped scenario: CPU, errors, events, side by side.
 
     python benchmarks/stepping.py [--only motor,driven]
 
-Each recording of a scenario (of ``actuator.toml`` those of its stages; each condition of a tuning) runs on the scenario's
-FMU with its own tolerance, in turns: freely, and communicating at every sample. Errors are the largest deviation of any
-signal in any sample from a run at 1e-9 that communicates at every sample, in standard deviations of the rig's sensors
+Each recording of a scenario (each condition of a tuning) runs on the scenario's FMU with its own tolerance, in turns:
+freely, and communicating at every sample. Errors are the largest deviation of any signal in any sample from a run at 1e-9 that communicates at every sample, in standard deviations of the rig's sensors
 (``SIGMA``; of other signals, those that the recording's noise has). CPU seconds are those of ``Plant.run``, medians.
 """
 
@@ -76,7 +75,9 @@ def run(plant: Plant, experiment: Experiment, tolerance: float | None = None) ->
     )
 
 
-def compare(experiment: Experiment, noise: Mapping[str, float], turns: int) -> tuple[float, float, float, float]:
+def compare(
+    experiment: Experiment, noise: Mapping[str, float], turns: int
+) -> tuple[float, float, float, float]:
     """CPU seconds by samples and freely, and the largest error of each in standard deviations."""
     with (
         Plant.open(experiment.fmu, stepping="samples") as stepped,
@@ -88,7 +89,9 @@ def compare(experiment: Experiment, noise: Mapping[str, float], turns: int) -> t
         for plant in (stepped, free):
             found = run(plant, experiment)
             shown = [n for n in found.names if noise.get(n)]
-            worst.append(max((float(abs(found[n] - reference[n]).max()) / noise[n] for n in shown), default=0.0))
+            worst.append(
+                max((float(abs(found[n] - reference[n]).max()) / noise[n] for n in shown), default=0.0)
+            )
         for _ in range(turns):
             for plant in (stepped, free):
                 begin = time.thread_time()

@@ -2,8 +2,8 @@
 
 A solver has to stop where an input bends or jumps, and nowhere else. Recordings have samples everywhere, most of them
 on the line through their neighbours up to the rounding of the file: samples are left out as long as the line through
-those that stay is never further from any of them than ``merging_tolerance`` says, which is the samples' own rounding and
-at most ``MERGED`` of the input's range. Held inputs are never touched: each change of value is a jump.
+those that stay is never further from any of them than ``merging_tolerance`` says: the samples' own rounding, and at
+most ``MERGED`` of the input's range. Held inputs are never touched: each change of value is a jump.
 """
 
 from collections.abc import Sequence
@@ -99,8 +99,8 @@ def segments(
 def merging_tolerance(values: FloatArray, merged: float = MERGED) -> float:
     """How far the course of an input may run from its samples ``values`` (n,), in their unit.
 
-    Twice the step to which they are rounded, between 1e-10 of the range and ``merged`` of it; with ``merged`` = 0 nothing
-    is left out. Rounding by r leaves fourth differences of 2.4 r (standard deviation), a smooth course leaves none;
+    Twice the step to which they are rounded, between 1e-10 of the range and ``merged`` of it; with ``merged`` = 0
+    nothing is left out. Rounding by r leaves fourth differences of 2.4 r (standard deviation), a smooth course none;
     constant stretches and the few corners do not count.
     """
     span = float(np.ptp(values)) if len(values) else 0.0

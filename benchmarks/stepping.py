@@ -3,8 +3,9 @@
     python benchmarks/stepping.py [--only motor,driven]
 
 Each recording of a scenario (each condition of a tuning) runs on the scenario's FMU with its own tolerance, in turns:
-freely, and communicating at every sample. Errors are the largest deviation of any signal in any sample from a run at 1e-9 that communicates at every sample, in standard deviations of the rig's sensors
-(``SIGMA``; of other signals, those that the recording's noise has). CPU seconds are those of ``Plant.run``, medians.
+freely, and communicating at every sample. Errors are the largest deviation of any signal in any sample from a run at
+1e-9 that communicates at every sample, in standard deviations of the rig's sensors (``SIGMA``; of other signals, those
+that the recording's noise has). CPU seconds are those of ``Plant.run``, medians.
 """
 
 import argparse

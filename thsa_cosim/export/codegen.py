@@ -298,7 +298,8 @@ def _tables(model: CausalModel) -> str:
         chosen = {v.index: v.start or 0.0 for v in model.variables if v.kind == kind}
         return numbers([chosen[index] for index in sorted(chosen)])
 
-    messages = ", ".join(_quoted(f"{a.message} ({_short(a.place)})") for a in model.flat.assertions) or '""'
+    messages = ", ".join(_quoted(f"{a.message} ({_short(a.place)})") for a in model.flat.assertions)
+    asserted = [f"const char *const model_assertion_text[] = {{{messages}}};"] if messages else []
     nominals = [abs(state.nominal or 1.0) for state in states] or [1.0]
     tunable = ["1"] * model.p.numel() or ["0"]
     return "\n".join(
@@ -307,7 +308,7 @@ def _tables(model: CausalModel) -> str:
             f"const double model_u_start[] = {{{starts('input')}}};",
             f"const double model_x_start[] = {{{numbers([state.start or 0.0 for state in states])}}};",
             f"const double model_x_nominal[] = {{{numbers(nominals)}}};",
-            f"const char *const model_assertion_text[] = {{{messages}}};",
+            *asserted,
             f"const unsigned char model_p_tunable[] = {{{', '.join(tunable)}}};",
             "",
         ]

@@ -35,8 +35,9 @@ def split_discrete(flat: FlatModel) -> Discrete:
     }
     definitions: dict[str, Scalar] = {v.name: v.binding for v in unknown.values() if v.binding is not None}
     candidates, rest = [], []
+    at_events = {str(_name(e.left)) for e in flat.equations if e.event}
     for equation in flat.equations:
-        solved = _solutions(equation, flat, unknown)
+        solved = _solutions(equation, flat, unknown, at_events)
         if solved:
             candidates.append((equation, {n: value for n, value in solved.items() if n not in definitions}))
         else:
@@ -59,7 +60,7 @@ def split_discrete(flat: FlatModel) -> Discrete:
 
 
 def _solutions(
-    equation: FlatEquation, flat: FlatModel, unknown: dict[str, FlatVariable]
+    equation: FlatEquation, flat: FlatModel, unknown: dict[str, FlatVariable], at_events: set[str]
 ) -> dict[str, Scalar]:
     """The discrete variables that an equation can be solved for, with their values; none if it is continuous."""
     found: dict[str, Scalar] = {}
@@ -70,13 +71,24 @@ def _solutions(
         name = _name(target.args[0] if negated else target)
         if name is None or name not in unknown:
             continue
-        if whole or unknown[name].type == "Real":
-            found[name] = make("not", value) if negated else value
-    if not found and whole and equation.left != 0.0:
+        if unknown[name].type == "Real":
+            # a Real elsewhere than on the left of its own equation is just used there
+            if target is not equation.left or (name in at_events and not equation.event):
+                continue
+        elif not whole or (name in at_events and not equation.event):
+            continue
+        found[name] = make("not", value) if negated else value
+    if not found and whole and not _given(equation, at_events):
         raise ModelicaError(
             f"{equation.place}: the equation {equation} of discrete variables cannot be solved."
         )
     return found
+
+
+def _given(equation: FlatEquation, at_events: set[str]) -> bool:
+    """Whether an equation is between a number and something, or uses what a when clause gives."""
+    sides = {_name(equation.left), _name(equation.right)}
+    return equation.left == 0.0 or bool(sides & at_events)
 
 
 def _name(term: Scalar) -> str | None:

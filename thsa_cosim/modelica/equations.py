@@ -233,7 +233,7 @@ class Collector:
             for active, assigned in reversed(fired):
                 value = make("if", active, assigned.get(name, Term("pre", (reference,))), value)
             self.discrete.add(name)
-            made.append(FlatEquation(reference, value, place))
+            made.append(FlatEquation(reference, value, place, True))
         return made
 
     def _when_body(self, body: list[Equation], evaluator: Evaluator, guard: Scalar) -> dict[str, Scalar]:
@@ -312,7 +312,7 @@ class Collector:
                 if isinstance(reference, Term) and reference.op == "ref":
                     if targets[name]:
                         self.discrete.add(reference.args[0])
-                    made.append(FlatEquation(reference, value, place))
+                    made.append(FlatEquation(reference, value, place, targets[name]))
         return made
 
 

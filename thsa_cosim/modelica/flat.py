@@ -36,11 +36,12 @@ class FlatVariable:
 
 @dataclass(frozen=True)
 class FlatEquation:
-    """``left = right`` at ``file:line``."""
+    """``left = right`` at ``file:line``; ``event``: it stands in a when clause, and left is a variable."""
 
     left: Scalar
     right: Scalar
     place: str
+    event: bool = False
 
     def __str__(self) -> str:
         return f"{text(self.left)} = {text(self.right)}"

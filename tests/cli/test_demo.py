@@ -103,6 +103,19 @@ def test_in_an_empty_folder_the_demo_brings_its_data(tmp_path: Path, monkeypatch
     assert all(path.is_relative_to("out") and path.is_file() for path in paths)
 
 
+def test_an_index_shows_where_an_effect_sits_and_what_each_step_found(tmp_path: Path) -> None:
+    picture = tmp_path / "a.png"
+    picture.write_bytes(b"\x89PNG")
+    entry = Entry(
+        "A", "why", ("diagnose",), (), 1.0, None, picture, ("windage:motor", "stribeck:gearbox", "mine")
+    )
+    html = write_index(tmp_path / "index.html", "Title", [entry]).read_text()
+    assert html.count('class="found"') == 2
+    assert 'src="data:image/png;base64,iVBORw=="' in html
+    blocks = re.findall(r'class="(found|block)".*?<text[^>]*>([^<]+)<', html, flags=re.S)
+    assert [name for kind, name in blocks if kind == "found"] == ["Motor", "Gearbox"]
+
+
 def test_an_index_links_only_pages_that_exist(tmp_path: Path) -> None:
     page = tmp_path / "a study" / "report.html"
     page.parent.mkdir()

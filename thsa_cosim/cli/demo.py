@@ -32,6 +32,8 @@ class Step:
     folder: Path | None = None
     """Where its page is, if it is a study."""
     needs_exporter: bool = False
+    picture: str = ""
+    """File name of the plot that shows what came out."""
 
 
 @click.command()
@@ -74,7 +76,9 @@ def demo(output: Path, quick: bool) -> None:
             out.print(Text(f"→ {sentence}", "bold"), soft_wrap=True)
         page = None if step.folder is None else step.folder / "report.html"
         seconds = time.monotonic() - started
-        entries.append(Entry(step.title, step.why, step.words, tuple(found), seconds, page))
+        picture = None if step.folder is None else step.folder / "plots" / step.picture
+        effects = _effects(step)
+        entries.append(Entry(step.title, step.why, step.words, tuple(found), seconds, page, picture, effects))
     index = write_index(output / "index.html", "thsa-cosim: the whole loop on the shipped data", entries)
     click.echo(f"\nAll of it took {time.monotonic() - begin:.0f} s. Open {index}")
 
@@ -111,6 +115,7 @@ def _steps(root: Path, output: Path, quick: bool, can_export: bool) -> list[Step
             ("identify", str(scenarios / "motor.toml"), *fit, "-o", str(identify)),
             lambda: _identified(identify),
             identify,
+            picture="laws.png",
         ),
         Step(
             "Tune the velocity controller at -30 degC against 55 kN",
@@ -118,6 +123,7 @@ def _steps(root: Path, output: Path, quick: bool, can_export: bool) -> list[Step
             ("tune", str(scenarios / "table4.toml"), "--fmu", str(fmu), "-o", str(tune)),
             lambda: _tuned(tune),
             tune,
+            picture="response_T_amb_-30_degC_F_load_55_kN.png",
         ),
         Step(
             "Diagnose a recording that shows an effect the model lacks",
@@ -127,8 +133,21 @@ def _steps(root: Path, output: Path, quick: bool, can_export: bool) -> list[Step
             lambda: _diagnosed(diagnose),
             diagnose,
             needs_exporter=True,
+            picture="evidence.png",
         ),
     ]
+
+
+def _effects(step: Step) -> tuple[str, ...]:
+    """The effects that a diagnosis named."""
+    if step.words[0] != "diagnose" or step.folder is None:
+        return ()
+    study = open_study(step.folder)
+    return (
+        tuple(dict.fromkeys(study.effects.index.get_level_values("effect")))
+        if isinstance(study, DiagnoseStudy)
+        else ()
+    )
 
 
 def _run(step: Step) -> None:

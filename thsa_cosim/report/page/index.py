@@ -1,5 +1,6 @@
 """An HTML page that leads to the pages of several studies."""
 
+import base64
 import os
 import shlex
 from collections.abc import Sequence
@@ -8,11 +9,15 @@ from pathlib import Path
 from urllib.parse import quote
 
 from thsa_cosim import __version__
+from thsa_cosim.report.page.diagram import boxes
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One step: what it was for, the ``words`` of its command, what came out, how long it took [s], its page."""
+    """One step: what it was for, the ``words`` of its command, what came out, how long it took [s], its page.
+
+    ``picture`` is a PNG file that shows what came out; ``effects`` what a diagnosis found, by name.
+    """
 
     title: str
     why: str
@@ -20,6 +25,15 @@ class Entry:
     outcome: tuple[str, ...]
     seconds: float
     page: Path | None
+    picture: Path | None = None
+    effects: tuple[str, ...] = ()
+
+    @property
+    def image(self) -> str:
+        """The picture as a data URI, so that the page needs no other file; nothing where there is none."""
+        if self.picture is None or not self.picture.is_file():
+            return ""
+        return "data:image/png;base64," + base64.b64encode(self.picture.read_bytes()).decode("ascii")
 
     @property
     def command(self) -> str:
@@ -46,8 +60,14 @@ def write_index(path: Path, title: str, entries: Sequence[Entry]) -> Path:
         else ""
         for entry in entries
     ]
+    effects = [effect for entry in entries for effect in entry.effects]
     html = environment.get_template("index.html").render(
-        title=title, entries=list(zip(entries, links, strict=True)), style=Markup(style), version=__version__
+        title=title,
+        boxes=boxes(effects),
+        effects=effects,
+        entries=list(zip(entries, links, strict=True)),
+        style=Markup(style),
+        version=__version__,
     )
     path.write_text(html, encoding="utf-8")
     return path

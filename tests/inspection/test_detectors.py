@@ -71,6 +71,8 @@ def test_a_defect_is_named_on_its_channel(defect: str, name: str, channel: str) 
         pytest.skip("its noise dithers every lattice of that size, or it is an input")
     seed = sum(map(ord, defect + name + channel))
     table[channel] = damage(time, values, np.random.default_rng(seed))
+    if np.unique(table[channel]).size < 5:
+        pytest.skip("two levels: there is no noise to be seen, which loading refuses")
     inputs = (*INPUTS, "velocity") if name.startswith(("screw", "gearbox")) else INPUTS
     hits = [f for f in found(table, inputs) if f.channel == channel and f.kind in kinds]
     assert hits, [(f.channel, f.kind) for f in found(table, inputs)]

@@ -39,6 +39,8 @@ def test_fmi3_description_has_aliases_arrays_and_intermediate_update() -> None:
     assert [v.name for v in d.outputs] == ["y", "feed", "count"]
     assert d.capabilities["providesDirectionalDerivative"] is True
     assert d.variables["vector"].is_array
+    assert d.variables["vector[2]"].element == (13, 1, 2)
+    assert [v.name for v in d.parameters if v.name.startswith("vector")] == ["vector[1]", "vector[2]"]
     assert d.variables["u"].intermediate_update
     assert not d.variables["single"].intermediate_update
     assert (d.states, d.event_indicators) == (1, 1)

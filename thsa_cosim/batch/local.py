@@ -33,7 +33,8 @@ _AHEAD_S = 0.02
 _SILENT_TICKS = 200
 _SILENT = (Status.EXIT, "the answer of the worker did not arrive: the FMU spoilt its pipe")
 _GARBLED = (Status.EXIT, "the FMU wrote into the worker's pipe")
-_CHANNEL = (_SILENT, _GARBLED)
+_CLOSED = (Status.EXIT, "the FMU closed the worker's pipe")
+_CHANNEL = (_SILENT, _GARBLED, _CLOSED)
 _AHEAD = 32
 """A worker has at hand what keeps it busy for _AHEAD_S, at most _AHEAD orders."""
 
@@ -257,7 +258,7 @@ class LocalRunner:
             case Returned(serials=serials):
                 self._returned(worker, serials, batch)
             case None:
-                self._died(worker, batch, None)
+                self._died(worker, batch, None if worker.ends_within(1.0) else _CLOSED)
             case _:
                 self._died(worker, batch, _GARBLED)
 

@@ -218,9 +218,14 @@ class WorkerProcess:
         """Tell the worker to end after the orders that it has."""
         self._send(Stop())
 
+    def ends_within(self, patience_s: float) -> bool:
+        """Wait for the worker to end by itself; return whether it did."""
+        until = time.monotonic() + patience_s
+        while not (died := self.has_died()) and time.monotonic() < until:
+            time.sleep(0.002)
+        return died
+
     def join(self, patience_s: float) -> int:
         """Wait for the worker to end by itself, then reap it."""
-        until = time.monotonic() + patience_s
-        while not self.has_died() and time.monotonic() < until:
-            time.sleep(0.002)
+        self.ends_within(patience_s)
         return self.reap()

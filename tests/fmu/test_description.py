@@ -156,3 +156,22 @@ def test_damaged_archive_leaves_no_folder(tmp_path: Path) -> None:
     with pytest.raises(FmuError, match="cannot be unpacked"):
         unpack(path, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_archives_that_unpack_to_much_more_than_they_are_are_refused(tmp_path: Path) -> None:
+    """Sizes as an archive states them: nothing of that size is made or read here."""
+    path = tmp_path / "bomb.fmu"
+    for name, size, says in (
+        ("resources/zeros.bin", 3 * 2**30, "would unpack from .* MiB to 3.0 GiB"),
+        ("modelDescription.xml", 2 * 2**30 - 1, "modelDescription.xml has 2048 MiB in an archive"),
+    ):
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("modelDescription.xml", build.LAG2)
+            archive.writestr(name, b"x" * 1000)
+            archive.getinfo(name).file_size = size
+        with pytest.raises(FmuError, match=says):
+            if name.startswith("resources"):
+                unpack(path, tmp_path / "out")
+            else:
+                read_description(path)
+    assert not (tmp_path / "out").exists()

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from thsa_cosim.errors import FmuError, did_you_mean
-from thsa_cosim.fmu.archive import open_archive, sha256_of
+from thsa_cosim.fmu.archive import open_archive, read_text, sha256_of
 
 FLOAT_TYPES = ("Real", "Float64", "Float32")
 INTEGERS = tuple(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))
@@ -151,7 +151,7 @@ def read_description(path: Path | str) -> FmuDescription:
     path = Path(path)
     with open_archive(path) as archive:
         try:
-            xml = archive.read("modelDescription.xml")
+            xml = read_text(path, archive, "modelDescription.xml")
         except KeyError:
             raise FmuError(f"{path} is a zip archive without modelDescription.xml and so no FMU.") from None
         except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, zlib.error) as error:

@@ -3,6 +3,7 @@
 import pickle
 import stat
 import zipfile
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -162,16 +163,15 @@ def test_archives_that_unpack_to_much_more_than_they_are_are_refused(tmp_path: P
     """Sizes as an archive states them: nothing of that size is made or read here."""
     path = tmp_path / "bomb.fmu"
     for name, size, says in (
-        ("resources/zeros.bin", 3 * 2**30, "would unpack from .* MiB to 3.0 GiB"),
+        ("resources/zeros.bin", 3 * 2**30, "would unpack to 3.0 GiB from 0.0 MiB"),
         ("modelDescription.xml", 2 * 2**30 - 1, "modelDescription.xml has 2048 MiB in an archive"),
     ):
         with zipfile.ZipFile(path, "w") as archive:
-            archive.writestr("modelDescription.xml", build.LAG2)
             archive.writestr(name, b"x" * 1000)
             archive.getinfo(name).file_size = size
+        refuse = (
+            read_description if name == "modelDescription.xml" else partial(unpack, folder=tmp_path / "out")
+        )
         with pytest.raises(FmuError, match=says):
-            if name.startswith("resources"):
-                unpack(path, tmp_path / "out")
-            else:
-                read_description(path)
+            refuse(path)
     assert not (tmp_path / "out").exists()

@@ -61,7 +61,7 @@ def check_archive(path: Path, archive: zipfile.ZipFile) -> None:
     packed = path.stat().st_size
     if total > min(MAXIMUM_UNPACKED_BYTES, max(_ALWAYS_BYTES, _RATIO * packed)):
         raise FmuError(
-            f"{path} would unpack from {packed / 2**20:.1f} MiB to {total / 2**30:.1f} GiB, which no FMU needs."
+            f"{path} would unpack to {total / 2**30:.1f} GiB from {packed / 2**20:.1f} MiB, which no FMU needs."
         )
 
 

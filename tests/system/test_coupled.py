@@ -1,6 +1,7 @@
 """Two first-order lags in a ring, and what hangs on them, against closed forms."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.system import open_plant, read_description, unpack
 from thsa_cosim.system.assemble import Part, Wire, assemble
+from thsa_cosim.system.structure import checked
 from thsa_cosim.system.write import write_ssp
 
 TIME = np.linspace(0.0, 1.0, 101)
@@ -166,3 +168,26 @@ def test_a_component_that_fails_is_named(tmp_path: Path, fmi2: Path) -> None:
     faulty = Part("slow", fmi2, "coupled", 0.01, start={"fault": float(build.FAULTS["error"]), "at": 0.5})
     with pytest.raises(SimulationFailure, match=r"component slow: .*t = 0\.\d+ s"):
         run(tmp_path, [Part("fast", fmi2), faulty], RING, ["slow.y"])
+
+
+def test_units_of_a_connection_are_converted_once(tmp_path: Path) -> None:
+    """A drive in rad/s behind a command in m/s: 1000 times in mm, and the archive says the same when read again."""
+    parts = [Part("a", build.lag2()), Part("b", build.lag2())]
+    system, archives = assemble(
+        "s", parts, [Wire("a.feed", "b.u", 2.0, 0.5)], {"out": ["b.feed"], "in": ["a.u"]}
+    )
+    scaled = replace(
+        system, connectors=tuple(replace(c, unit="mm/s", convert=True) for c in system.connectors)
+    )
+    path = write_ssp(checked(scaled), archives, tmp_path / "units.ssp", DefaultExperiment(0.0, 1.0))
+    scratch = ScratchFolder()
+    try:
+        unpack(path, scratch.path / "system")
+        inputs = Signals(TIME, {"in": 1000.0 * TIME}, {"in": "mm/s"})
+        with open_plant(read_description(path), scratch.path / "system") as plant:
+            found = plant.run({}, inputs, ["a.feed", "b.feed", "out"], TIME)
+    finally:
+        scratch.remove()
+    assert np.max(np.abs(found["a.feed"] - TIME)) < 1e-12
+    assert np.max(np.abs(found["b.feed"] - (2.0 * TIME + 0.5))) < 1e-12
+    assert np.max(np.abs(found["out"] - 1000.0 * (2.0 * TIME + 0.5))) < 1e-9

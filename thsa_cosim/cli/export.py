@@ -24,11 +24,27 @@ from thsa_cosim.cli.options import PATH
     show_default=True,
     help="Exporter: ours, or OpenModelica.",
 )
+@click.option(
+    "--ssp",
+    is_flag=True,
+    help="MODEL is a scenario that describes a system of FMUs: write it as an SSP archive for other tools.",
+)
 @click.option("--platforms", default=None, help="Comma-separated FMI platforms, for example win64,linux64.")
 def export(
-    model: str, package: Path | None, fmi: str, output: Path | None, compiler: str, platforms: str | None
+    model: str,
+    package: Path | None,
+    fmi: str,
+    output: Path | None,
+    compiler: str,
+    ssp: bool,
+    platforms: str | None,
 ) -> None:
     """Export the Modelica class MODEL (or a .mo file's class) as an FMU."""
+    if ssp:
+        from thsa_cosim.scenario.archive import write_system
+
+        click.echo(str(write_system(Path(model), output)))
+        return
     from thsa_cosim.export import export_fmu
 
     chosen = None if platforms is None else [part.strip() for part in platforms.split(",") if part.strip()]

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from platform import machine as machine_name
 
 from thsa_cosim.errors import MissingExtraError, ThsaCosimError
 
@@ -34,6 +35,18 @@ PLATFORMS = (
     Platform(None, "aarch64-darwin", "aarch64-macos", ".dylib"),
     Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
 )
+
+
+def native_platform() -> Platform:
+    """The platform that this process runs on; ThsaCosimError if nothing can be built for it."""
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine_name().lower(), machine_name().lower())
+    system = {"linux": "linux", "darwin": "darwin", "win32": "windows"}.get(sys.platform, sys.platform)
+    for platform in PLATFORMS:
+        if platform.fmi3 == f"{machine}-{system}":
+            return platform
+    raise ThsaCosimError(f"FMUs cannot be built for {machine}-{system}.")
+
+
 FLAGS = (
     "-std=c99",
     "-O2",

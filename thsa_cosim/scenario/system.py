@@ -1,12 +1,14 @@
 """What a scenario simulates, opened: an FMU, an SSP archive, or the system of its own tables."""
 
+import zipfile
 from pathlib import Path
 
 from thsa_cosim.errors import ScenarioError
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.scenario.system_schema import ModelTable
 from thsa_cosim.system import read_description
-from thsa_cosim.system.assemble import Part, Wire, assembled
+from thsa_cosim.system.assemble import Part, Wire, assembled, system_folder
+from thsa_cosim.system.description import SystemDescription
 
 
 def open_model(
@@ -19,9 +21,14 @@ def open_model(
     if isinstance(replaced_by, FmuDescription):
         return replaced_by
     if replaced_by is not None:
-        return read_description(replaced_by)
+        return _compiled(Path(replaced_by), table)
     if table.fmu:
-        return read_description(path.parent / table.fmu)
+        return _compiled(path.parent / table.fmu, table)
+    return _compiled(assemble_tables(path, table), table)
+
+
+def assemble_tables(path: Path, table: ModelTable) -> Path:
+    """Return the archive of the system that the tables of the scenario ``path`` describe."""
     parts = [
         Part(
             c.name,
@@ -37,6 +44,21 @@ def open_model(
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise ScenarioError(f"components: two are named {twice!r}; give each its own name.")
-    wires = [Wire(c.source, c.target, c.factor, c.offset) for c in table.connections]
+    wires = [Wire(c.source, c.target, c.factor, c.offset, c.convert) for c in table.connections]
     pins = {name: [given] if isinstance(given, str) else given for name, given in table.connectors.items()}
-    return read_description(assembled(path.stem, parts, wires, pins))
+    return assembled(path.stem, parts, wires, pins)
+
+
+def _compiled(path: Path, table: ModelTable) -> FmuDescription:
+    """Describe an FMU or a system; a system that can be merged into one FMU as that FMU."""
+    description = read_description(path)
+    if not isinstance(description, SystemDescription) or not table.merge:
+        return description
+    from thsa_cosim.export.merge import NotMergeable, merge
+
+    with zipfile.ZipFile(path) as archive:
+        parts = {c.source: archive.read(c.source) for c in description.system.components}
+    try:
+        return read_description(merge(description, parts, system_folder() / "merged"))
+    except NotMergeable:
+        return description

@@ -45,6 +45,7 @@ class Wire:
     target: str
     factor: float = 1.0
     offset: float = 0.0
+    convert: bool = True
 
 
 def assemble(
@@ -68,7 +69,9 @@ def assemble(
         components.append(Component(part.name, fmu, source, execution, dict(part.start), step, part.delay))
 
     by_name = {component.name: component.fmu for component in components}
-    links = [Connection(_pin(w.source, names), _pin(w.target, names), w.factor, w.offset) for w in wires]
+    links = [
+        Connection(_pin(w.source, names), _pin(w.target, names), w.factor, w.offset, w.convert) for w in wires
+    ]
     outside = [
         _connector(shown, [_pin(pin, names) for pin in pins], by_name) for shown, pins in connectors.items()
     ]
@@ -92,13 +95,18 @@ def _connector(name: str, pins: Sequence[tuple[str, str]], fmus: Mapping[str, Fm
     return Connector(name, causality, tuple((pin, 1.0, 0.0) for pin in pins))  # type: ignore[arg-type]
 
 
+def system_folder() -> Path:
+    """Folder in the user's cache where systems are kept by their content."""
+    base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    return Path(base).expanduser() / "thsa-cosim" / "systems"
+
+
 def assembled(
     name: str, parts: Sequence[Part], wires: Sequence[Wire], connectors: Mapping[str, Sequence[str]]
 ) -> Path:
     """Write the system as an archive into the user's cache folder, named after its content, and return its path."""
     system, archives = assemble(name, parts, wires, connectors)
-    base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    folder = Path(base).expanduser() / "thsa-cosim" / "systems"
+    folder = system_folder()
     stops = [c.fmu.default_experiment.stop for c in system.components if c.fmu.default_experiment.stop]
     experiment = DefaultExperiment(0.0, max(stops, default=None))
     try:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription, Variable
 from thsa_cosim.system.order import stages
-from thsa_cosim.system.structure import System, connected_inputs
+from thsa_cosim.system.structure import System, connected_inputs, qualified
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def describe_system(
             if pin in written:
                 causality = "local"
             start = component.start.get(variable.name, variable.start)
-            add(".".join(pin), replace(variable, causality=causality, start=start), ((pin, 1.0, 0.0),))
+            add(qualified(*pin), replace(variable, causality=causality, start=start), ((pin, 1.0, 0.0),))
     continuous = [c for c in system.components if c.execution == "continuous"]
     platforms = set.intersection(*(set(c.fmu.platforms) for c in system.components))
     return SystemDescription(

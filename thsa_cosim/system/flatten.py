@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from thsa_cosim.errors import FmuError, UnitError, did_you_mean
 from thsa_cosim.fmu.description import FmuDescription
@@ -95,6 +96,17 @@ class _Node:
     name: str
 
 
+@dataclass(frozen=True)
+class _Way:
+    """From one connector to another: end = factor * start + offset, then units where ``convert`` says so."""
+
+    start: _Node
+    end: _Node
+    factor: float
+    offset: float
+    convert: bool
+
+
 def flattened(nested: Nested) -> System:
     """Flatten and check; FmuError in one sentence where something does not fit."""
     components = list(_components(nested, ""))
@@ -102,39 +114,45 @@ def flattened(nested: Nested) -> System:
     components = [replace(c, start=starts.get(c.name, {})) for c in components]
     links = list(_links(nested, ""))
     names = {c.name for c in components}
-    into: dict[_Node, list[tuple[_Node, float, float]]] = {}
-    for start, end, factor, offset in links:
-        into.setdefault(end, []).append((start, factor, offset))
+    into: dict[_Node, list[_Way]] = {}
+    for way in links:
+        into.setdefault(way.end, []).append(way)
     for end, writers in into.items():
         if len(writers) > 1:
-            shown = " and ".join(f"{w.path}.{w.name}".strip(".") for w, *_ in writers)
+            shown = " and ".join(f"{w.start.path}.{w.start.name}".strip(".") for w in writers)
             raise FmuError(f"{end.path}.{end.name}".strip(".") + f" has two writers, {shown}; keep one.")
     connections = []
-    inputs: dict[str, list[tuple[tuple[str, str], float, float]]] = {}
+    inputs: dict[str, list[_Way]] = {}
     for end in into:
         if end.path not in names:
             continue
-        start, factor, offset = _origin(end, into, names)
-        if start.path in names:
-            connections.append(Connection((start.path, start.name), (end.path, end.name), factor, offset))
-        elif start.path == "":
-            inputs.setdefault(start.name, []).append(((end.path, end.name), factor, offset))
+        way = _origin(end, into, names)
+        if way.start.path in names:
+            source, target = (way.start.path, way.start.name), (end.path, end.name)
+            connections.append(Connection(source, target, way.factor, way.offset, way.convert))
+        elif way.start.path == "":
+            inputs.setdefault(way.start.name, []).append(way)
         else:
-            raise FmuError(
-                f"nothing is connected to {start.path}.{start.name}, which {end.path}.{end.name} takes; connect it."
-            )
-    connectors = [
-        Connector(name, "input", tuple(pins), nested.connectors.get(name, ("", ""))[1])
-        for name, pins in inputs.items()
-    ]
-    for name, (kind, unit) in nested.connectors.items():
+            where = f"{way.start.path}.{way.start.name}"
+            raise FmuError(f"nothing is connected to {where}, which {end.path}.{end.name} takes; connect it.")
+    connectors = [_connector(nested, name, "input", ways) for name, ways in inputs.items()]
+    for name, (kind, _) in nested.connectors.items():
         if kind == "output" and _Node("", name) in into:
-            start, factor, offset = _origin(_Node("", name), into, names)
-            if start.path in names:
-                connectors.append(
-                    Connector(name, "output", (((start.path, start.name), factor, offset),), unit)
-                )
+            way = _origin(_Node("", name), into, names)
+            if way.start.path in names:
+                connectors.append(_connector(nested, name, "output", [way]))
     return checked(System(nested.name, tuple(components), tuple(connections), tuple(connectors)))
+
+
+def _connector(
+    nested: Nested, name: str, causality: Literal["input", "output"], ways: "list[_Way]"
+) -> Connector:
+    pins = []
+    for way in ways:
+        node = way.end if causality == "input" else way.start
+        pins.append(((node.path, node.name), way.factor, way.offset))
+    unit = nested.connectors.get(name, ("", ""))[1]
+    return Connector(name, causality, tuple(pins), unit, convert=all(way.convert for way in ways))
 
 
 def _components(nested: Nested, path: str) -> Iterator[Component]:
@@ -171,7 +189,7 @@ def _step(element: Element) -> float | None:
     return element.fmu.default_experiment.step or 1e-3
 
 
-def _links(nested: Nested, path: str) -> Iterator[tuple[_Node, _Node, float, float]]:
+def _links(nested: Nested, path: str) -> Iterator[_Way]:
     inside = {e.name: e for e in nested.elements}
     for link in nested.links:
         ends = []
@@ -189,30 +207,28 @@ def _links(nested: Nested, path: str) -> Iterator[tuple[_Node, _Node, float, flo
                     f"connection {link}: there is no connector {connector!r}.{did_you_mean(connector, known)}"
                 )
             ends.append(_Node(f"{path}{name}" if name else path.rstrip("."), connector))
-        yield ends[0], ends[1], link.factor, link.offset
+        yield _Way(ends[0], ends[1], link.factor, link.offset, not link.suppress_units)
     for element in nested.elements:
         if isinstance(element, Nested):
             yield from _links(element, f"{path}{element.name}.")
 
 
-def _origin(
-    end: _Node, into: Mapping[_Node, list[tuple[_Node, float, float]]], names: set[str]
-) -> tuple[_Node, float, float]:
+def _origin(end: _Node, into: Mapping[_Node, list[_Way]], names: set[str]) -> _Way:
     """Follow connectors of nested systems back to a component's output or a connector of the whole."""
-    node, factor, offset = end, 1.0, 0.0
+    node, factor, offset, convert = end, 1.0, 0.0, True
     seen = {end}
-    while True:
-        if node not in into:
-            return node, factor, offset
-        node, f, o = into[node][0]
-        factor, offset = factor * f, factor * o + offset
+    while node in into:
+        way = into[node][0]
+        node, convert = way.start, convert and way.convert
+        factor, offset = factor * way.factor, factor * way.offset + offset
         if node.path in names:
-            return node, factor, offset
+            break
         if node in seen:
             raise FmuError(
                 f"the connectors {node.path}.{node.name} and others feed each other in a circle; cut it."
             )
         seen.add(node)
+    return _Way(node, end, factor, offset, convert)
 
 
 def _starts(

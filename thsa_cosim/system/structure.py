@@ -5,7 +5,7 @@ that nothing is connected to are inputs of the system.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from thsa_cosim.errors import FmuError, UnitError, did_you_mean
@@ -43,6 +43,8 @@ class Connection:
     target: tuple[str, str]
     factor: float = 1.0
     offset: float = 0.0
+    convert: bool = True
+    """Whether units are still to be converted; False: factor and offset do it."""
 
     def __str__(self) -> str:
         return f"{'.'.join(self.source)} -> {'.'.join(self.target)}"
@@ -59,6 +61,8 @@ class Connector:
     connector = factor * pin + offset."""
     unit: str = ""
     description: str = ""
+    convert: bool = True
+    """As for a connection."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,13 @@ class System:
             raise FmuError(f"component {pin[0]!r}: {error}" if pin[0] else str(error)) from None
 
 
+def qualified(component: str, variable: str) -> str:
+    """Name of a component's variable in the system; a derivative stays one: ``der(plant.x)``."""
+    if variable.startswith("der(") and variable.endswith(")"):
+        return f"der({component}.{variable[4:-1]})"
+    return f"{component}.{variable}"
+
+
 def unit_conversion(source: Variable, target: Variable, where: str) -> tuple[float, float]:
     """Return (factor, offset) from the unit of ``source`` to that of ``target``; FmuError if there is none."""
     if not source.unit or not target.unit or source.unit == target.unit:
@@ -95,7 +106,9 @@ def unit_conversion(source: Variable, target: Variable, where: str) -> tuple[flo
     try:
         return conversion(source.unit, target.unit)
     except UnitError as error:
-        raise FmuError(f"connection {where}: {error} Give the connection a factor instead.") from None
+        raise FmuError(
+            f"connection {where}: {error} Or give the connection a factor and convert = false."
+        ) from None
 
 
 def checked(system: System) -> System:
@@ -123,13 +136,16 @@ def checked(system: System) -> System:
             raise FmuError(
                 f"connection {connection}: {source.type} does not go into {target.type}; round it in a component."
             )
-        factor, offset = unit_conversion(source, target, str(connection))
+        factor, offset = (
+            unit_conversion(source, target, str(connection)) if connection.convert else (1.0, 0.0)
+        )
         connections.append(
             Connection(
                 connection.source,
                 connection.target,
                 connection.factor * factor,
-                connection.factor * offset + connection.offset,
+                factor * connection.offset + offset,
+                convert=False,
             )
         )
     connectors = tuple(_checked_connector(system, c, writers) for c in system.connectors)
@@ -164,18 +180,18 @@ def _checked_connector(
             _claim(pin, variable, f"connector {connector.name}", writers)
         unit = unit or variable.unit or ""
         scale, shift = 1.0, 0.0
-        if variable.unit and unit and variable.unit != unit:
+        if connector.convert and variable.unit and unit and variable.unit != unit:
             pair = (unit, variable.unit) if connector.causality == "input" else (variable.unit, unit)
             try:
                 scale, shift = conversion(*pair)
             except UnitError as error:
                 raise FmuError(f"connector {connector.name} - {'.'.join(pin)}: {error}") from None
-        pins.append((pin, factor * scale, factor * shift + offset))
+        pins.append((pin, factor * scale, scale * offset + shift))
     if connector.causality == "output" and len(pins) != 1:
         raise FmuError(
             f"the output connector {connector.name} has {len(pins)} sources; connect one output to it."
         )
-    return Connector(connector.name, connector.causality, tuple(pins), unit, connector.description)
+    return replace(connector, pins=tuple(pins), unit=unit, convert=False)
 
 
 def _check_component(component: Component) -> None:

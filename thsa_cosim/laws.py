@@ -11,7 +11,6 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from thsa_cosim.errors import InputError, did_you_mean
 
@@ -211,6 +210,8 @@ def _fit_exponentials(terms: int, t: FloatArray, y: FloatArray, sigma: FloatArra
 
     A fine grid of β that spans e^±6 over the temperatures starts the search, at all valleys of its profile.
     """
+    from scipy.optimize import least_squares  # slow to import, and most laws are polynomials
+
     span = max(float(np.ptp(t)), 1.0)
     middle = 0.5 * (float(np.max(t)) + float(np.min(t)))
     s = (t - middle) / span

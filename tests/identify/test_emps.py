@@ -8,19 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.idim_ls import asymmetric_law, fit_force, symmetric_law
 from scipy.interpolate import CubicSpline
 from scipy.io import loadmat
 
 from thsa_cosim.fmu import Plant
-from thsa_cosim.inverse_dynamics import (
-    asymmetric_law,
-    fit_force,
-    force_residual,
-    low_pass,
-    motion,
-    repeatability,
-    symmetric_law,
-)
+from thsa_cosim.inverse_dynamics import force_residual, low_pass, motion, repeatability
 from thsa_cosim.signals import Signals
 
 ROOT = Path(__file__).parents[2]

@@ -15,7 +15,7 @@ from thsa_cosim.tune.margins import FREQUENCIES, margins_by_control, margins_of
 from thsa_cosim.tune.pareto import front
 from thsa_cosim.tune.population import PopulationPath, line_of
 from thsa_cosim.tune.samples import deviations
-from thsa_cosim.tune.schedule import GainSchedule, largest_jump, smooth
+from thsa_cosim.tune.schedule import GainSchedule, smooth
 
 NAMES = ("tracking", "rise_time", "steady_state_error", "overshoot", "phase_margin")
 
@@ -195,7 +195,6 @@ def test_a_schedule_is_bilinear_and_held_beyond_its_ends() -> None:
     assert schedule.at({"T": -27.5, "F": 0.0})["K_p"] == pytest.approx((1 + 2 + 3 + 4) / 4)
     assert schedule.at({"T": 99.0, "F": 99.0})["K_p"] == 8.0
     assert schedule.points()[3] == {"T": 0.0, "F": 55.0, "K_p": 4.0}
-    assert largest_jump(schedule.gains["K_p"]) == pytest.approx(3.0)
 
 
 def test_samples_have_the_covariance_of_the_identification() -> None:

@@ -212,6 +212,8 @@ class _Run:
                     signs = self.signs()
                 while self.next_row < len(times) and times[self.next_row] <= t + slack and not self.ends:
                     self.record(t, solver.states)
+            while self.next_row < len(times) and times[self.next_row] <= t + slack:
+                self.record(t, solver.states)  # it ended itself just where the run ends
         finally:
             solver.close()
         if self.next_row < len(times):

@@ -7,13 +7,15 @@ run again with the costs of a journal repeats itself to the bit: that is the che
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, OptimizeResult, differential_evolution
 
 from thsa_cosim.search.strategies import Strategy
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 FloatArray = NDArray[np.float64]
 Evaluate = Callable[[FloatArray], FloatArray]
@@ -94,6 +96,8 @@ def evolve(
     ``evaluate`` takes a whole generation (S, n) and returns its costs (S,); NaN counts as +inf. It is
     called once for the initial population and once per generation, always from the calling thread.
     """
+    from scipy.optimize import Bounds, differential_evolution  # slow to import, and local searches come first
+
     history: list[Generation] = []
     evaluations = 0
     reason = ""
@@ -129,7 +133,7 @@ def evolve(
             record(vectors, costs)
         return costs
 
-    def callback(intermediate_result: OptimizeResult) -> None:
+    def callback(intermediate_result: "OptimizeResult") -> None:
         nonlocal reason
         population = np.asarray(intermediate_result.population, dtype=np.float64)
         costs = np.asarray(intermediate_result.population_energies, dtype=np.float64)

@@ -73,12 +73,3 @@ def _second_difference(x: FloatArray) -> FloatArray:
         a, b = x[k + 1] - x[k], x[k + 2] - x[k + 1]
         rows[k, k : k + 3] = (2.0 / (a * (a + b)), -2.0 / (a * b), 2.0 / (b * (a + b)))
     return rows
-
-
-def largest_jump(values: FloatArray) -> float:
-    """Largest ratio of neighbouring positive gains along any axis, at least 1; NaN where one is not positive."""
-    if not (values > 0.0).all():
-        return float("nan")
-    logs = np.log(values)
-    jumps = [np.abs(np.diff(logs, axis=axis)).max() for axis in range(values.ndim) if values.shape[axis] > 1]
-    return float(np.exp(max(jumps, default=0.0)))

@@ -9,6 +9,7 @@ from diagnosis.analytic import bench, candidates, unknowns
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute, prune
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged
 from thsa_cosim.diagnosis.choosing.gates import out_of_range
+from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, score
 from thsa_cosim.diagnosis.choosing.screen import screen
 from thsa_cosim.diagnosis.fitting.fit import refine
@@ -163,3 +164,36 @@ def test_effects_that_are_both_needed_stay():
     assert kept == accepted
     assert fit is final
     assert notes == []
+
+
+RIPPLE = {
+    "motorEffect.cogging.a_s": 0.25, "motorEffect.cogging.a_c": -0.1, "motorEffect.cogging.n": 12.0,
+    "motorEffect.cogging.a_s3": 0.1, "motorEffect.cogging.n_3": 18.0,
+    "motorEffect.cogging.a_c4": 0.07, "motorEffect.cogging.n_4": 7.0,
+}  # fmt: skip
+
+
+def test_a_ripple_of_several_orders_is_one_effect_with_all_of_them():
+    """Orders that are no multiples of each other, each smaller than the last: one effect of ``most``."""
+    offered = candidates(*NAMES)
+    own = bench(offered, RIPPLE)
+    waves = {"motor": (7.0, 12.0, 18.0, 31.0)}
+    found = attribute(own, unknowns(), offered, lambda fit: waves, seed=1, most=1)
+    assert found is not None
+    assert [s.candidate.name for s in found.accepted] == ["cogging:motor"] * 3
+    machine = Machine({"motor": {"motor": 1.0}}, {"motor": 60.0})
+    (effect,) = found_effects(found, found.final, machine)
+    assert effect.order == "12, 18, 7 per turn of the motor"
+    values = {name: value.value for name, value in effect.parameters.items()}
+    assert values["a_s"] == pytest.approx(0.25, abs=0.01)
+    assert {round(values["n_3"]), round(values["n_4"])} == {18, 7}
+    assert "n_5" not in values, "no more orders than there are"
+    np.testing.assert_allclose(np.mean(found.final_validate**2), 1.0, atol=0.1)
+
+
+def test_a_further_order_is_offered_only_beside_the_first():
+    offered = candidates("cogging")
+    own = bench(offered, {})
+    base = refine(own, unknowns(), unknowns().start)
+    assert base is not None
+    assert {p.candidate.variant.beside for p in screen(own, base, offered, {})} == {False}

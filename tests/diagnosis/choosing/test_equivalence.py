@@ -73,3 +73,28 @@ def test_what_drowns_in_chance_is_in_no_class_and_the_best_start_counts():
     assert [c.names for c in equivalence(attribution(best, second, other, weak))] == [("a", "b")]
     assert equivalence(attribution(weak, best)) == ()
     assert equivalence(attribution()) == ()
+
+
+def test_classes_come_closest_first_and_one_of_many_coefficients_counts_by_its_strongest():
+    e = BASIS
+
+    def tilted(angle: float, first: int, size: float) -> np.ndarray:
+        return size * (np.cos(angle) * e[:, first] + np.sin(angle) * e[:, 5])
+
+    wide = [proposal("a", tilted(0.0, 1, 20.0)), proposal("b", tilted(0.15, 1, 20.0))]
+    close = [proposal("c", tilted(0.0, 2, 20.0)), proposal("d", tilted(0.05, 2, 20.0))]
+    found = equivalence(attribution(*wide, *close))
+    assert [c.names for c in found] == [("c", "d"), ("a", "b")]
+    assert found[0].angle_deg == pytest.approx(np.degrees(0.05), rel=1e-3)
+    # Four hundred times as large in its unit at a twentieth of its size is the same candidate.
+    scaled = proposal("b", tilted(0.15, 1, 400.0), size=0.05)
+    assert [c.names for c in equivalence(attribution(wide[0], scaled))] == [("a", "b")]
+
+
+def test_what_does_nothing_is_at_a_right_angle_and_sizes_do_not_matter():
+    e = BASIS
+    nothing, long = np.zeros((N, 1)), np.stack([1e6 * e[:, 1], 1e-3 * e[:, 2]], axis=1)
+    found = principal_angles([nothing, long, e[:, [2]]])
+    assert found[0, 1] == pytest.approx(np.pi / 2)
+    assert found[1, 2] == pytest.approx(0.0, abs=1e-6)
+    assert found.dtype == np.float64

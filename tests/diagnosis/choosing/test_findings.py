@@ -179,6 +179,9 @@ def test_values_are_widened_by_what_is_left_and_split_into_declared_and_effects(
     assert values_of(fit, declared=True)["p"].stderr == pytest.approx(1.0)
     assert values_of(wide, declared=True)["p"].stderr == pytest.approx(2.0)
     assert list(values_of(fit, declared=False)) == ["motor.a.k"]
+    assert values_of(fit, declared=True)["p"] == Value(1.0, "N", pytest.approx(1.0))
+    ended = replace(fit, vector=np.array([9.0, 4.0]))
+    assert values_of(ended, declared=True)["p"].reason == "it ended at the end of its range, 9 N"
 
 
 def test_a_value_at_its_bound_unseen_or_only_known_from_the_drawing_is_not_determined():

@@ -90,7 +90,7 @@ class Variant:
 
     ``block`` and ``interface`` are class names within ``THSA.Effects`` and ``THSA.Interfaces`` (or qualified);
     ``slots`` restricts it to slots of these names (without the ending ``Effect``), None: all of the interface.
-    ``beside``: offered only once another variant of the block is in the model, with whose shape parameters it acts.
+    ``beside``: offered only once another variant of the block is in the model, as a further part of the same effect.
     ``law``: the block's equation, for FMUs without source (`diagnosis.blackbox`); None: not for those.
     """
 

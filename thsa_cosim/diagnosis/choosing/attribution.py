@@ -89,36 +89,30 @@ def attribute(
     current, current_held = base, held
     rounds: list[Round] = []
     accepted: list[Scored] = []
-    for number in range(most):
+    for _ in range(most):
         if accepted and weights.left(current_held) < SMALLEST_STRUCTURE**2:
             break
-        say(
-            f"screening {len(candidates)} candidates"
-            + (f" beside {accepted[-1].candidate.name}" if accepted else "")
-        )
-        taken = {s.candidate.key for s in accepted}
-        proposals = screen(bench, current, [c for c in candidates if c.key not in taken], scan(current))
-        gains = largest_gains(current, proposals, seed + number)
-        limit = threshold(gains)
-        selection = Selection(bench, weights, current, current_held, say)
-        scored = selection.refined(proposals, limit)
-        choice, objections = selection.choose(scored, limit, not accepted)
-        factors = bench.factors("fit")
-        named = {s.candidate.effect.name for s in accepted}
-        rivals: tuple[Scored, ...] = ()
-        if choice is not None:
-            scored += selection.elsewhere(choice, scored, proposals)
-            rivals = selection.rivals(choice, scored, named)
-        rounds.append(
-            Round(limit, tuple(proposals), tuple(scored), choice, objections, rivals, gains, factors)
-        )
-        if choice is None:
+        beside = f" beside {accepted[-1].candidate.name}" if accepted else ""
+        say(f"screening {len(candidates)} candidates{beside}")
+        offered: Sequence[Candidate] = candidates
+        while offered:
+            taken = {s.candidate.key for s in accepted}
+            selection = Selection(bench, weights, current, current_held, say)
+            left = [c for c in offered if c.key not in taken]
+            rounds.append(
+                _round(selection, left, scan(current), seed + len(rounds), accepted, offered is candidates)
+            )
+            choice = rounds[-1].accepted
+            if choice is None:
+                break
+            accepted.append(choice)
+            current, reweighed = weights.weigh(choice.fit)
+            if reweighed is None:
+                return None
+            current_held = reweighed
+            offered = further_parts(choice.candidate, candidates)
+        if offered is candidates:
             break
-        accepted.append(choice)
-        current, reweighed = weights.weigh(choice.fit)
-        if reweighed is None:
-            return None
-        current_held = reweighed
     accepted, current, current_held, notes = prune(bench, unknowns, weights, accepted, current, current_held)
     while accepted and (name := out_of_range(current)):
         notes.append(f"{accepted[-1].candidate.name} was dropped: it drives {name} to the end of its range")
@@ -138,6 +132,37 @@ def attribute(
         weights.plain(current_held, "validate"),
         tuple(notes),
     )
+
+
+def further_parts(accepted: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """What else the accepted effect's block can do in the same place, such as a ripple's further orders."""
+    return [
+        c
+        for c in candidates
+        if c.variant.beside and (c.variant.block, c.slot.name) == (accepted.variant.block, accepted.slot.name)
+    ]
+
+
+def _round(
+    selection: Selection,
+    offered: Sequence[Candidate],
+    waves: Mapping[str, Sequence[float]],
+    seed: int,
+    accepted: Sequence[Scored],
+    whole: bool,
+) -> Round:
+    """Screen what is ``offered`` (``whole``: all effects, else parts of the last one), refine the best, choose one."""
+    proposals = screen(selection.bench, selection.current, offered, waves)
+    gains = largest_gains(selection.current, proposals, seed)
+    limit = threshold(gains)
+    scored = selection.refined(proposals, limit)
+    choice, objections = selection.choose(scored, limit, not accepted, not whole)
+    rivals: tuple[Scored, ...] = ()
+    if choice is not None and whole:
+        scored += selection.elsewhere(choice, scored, proposals)
+        rivals = selection.rivals(choice, scored, {s.candidate.effect.name for s in accepted})
+    factors = selection.bench.factors("fit")
+    return Round(limit, tuple(proposals), tuple(scored), choice, objections, rivals, gains, factors)
 
 
 def prune(

@@ -87,7 +87,7 @@ def found_effects(found: Attribution, fit: Fit, machine: Machine = NO_MACHINE) -
                 parameters=_parameters(members, vague(members, values)),
                 equivalent=rivals,
                 probability=(1.0 - chance) / (1 + len(rivals)),
-                order="" if order is None else str(order),
+                order=_orders([o for m in members if (o := order_of(m, values, machine))]),
             )
         )
     return tuple(effects)
@@ -100,6 +100,14 @@ def order_of(scored: Scored, values: Mapping[str, Value], machine: Machine) -> O
             wave = values.get(p.variable, Value(scored.proposal.shapes.get(p.name, 0.0), p.unit, 0.0))
             return machine.order(scored.candidate.slot.name, wave.value, wave.stderr)
     return None
+
+
+def _orders(orders: Sequence[Order]) -> str:
+    """``12, 18 per turn of the motor``."""
+    parts: dict[str, dict[int, None]] = {}
+    for order in orders:
+        parts.setdefault(order.part, {})[order.number] = None
+    return "; ".join(f"{', '.join(map(str, n))} per turn of the {part}" for part, n in parts.items())
 
 
 def _named(scored: Scored, order: Order | None) -> str:

@@ -4,7 +4,7 @@ They read numbers only (`Evidence`), so that each can be tried without a simulat
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2, norm
@@ -59,6 +59,13 @@ def objection(evidence: Evidence, limit: float, first: bool) -> str:
     if evidence.signal_share < TOTAL_SHARE:
         return f"{name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left in any signal"
     return ""
+
+
+def objection_beside(evidence: Evidence, limit: float) -> str:
+    """Why the held-out recordings do not ask for a further part of an effect that is in the model, or ""."""
+    return objection(
+        replace(evidence, share=1.0, signal_share=1.0), limit, True
+    )  # the effect has passed these
 
 
 def signal_share(trials: Sequence[Trial], base: FloatArray, before: FloatArray, after: FloatArray) -> float:

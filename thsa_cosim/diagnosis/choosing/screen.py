@@ -88,7 +88,7 @@ def screen(
     rows: list[tuple[Candidate, dict[str, float]]] = [
         (candidate, shapes)
         for candidate in candidates
-        if not candidate.variant.beside or all(p.variable in known for p in candidate.shapes)
+        if not candidate.variant.beside or any(p.variable in known for p in candidate.all_parameters)
         for shapes in shape_starts(candidate, scanned, known)
     ]
     variables = {p.variable: p for c in candidates for p in c.parameters}

@@ -10,6 +10,7 @@ from thsa_cosim.diagnosis.choosing.gates import (
     insignificant,
     near_best,
     objection,
+    objection_beside,
     out_of_range,
     signal_share,
 )
@@ -102,13 +103,17 @@ class Selection:
         )
 
     def choose(
-        self, scored: Sequence[Scored], limit: float, first: bool
+        self, scored: Sequence[Scored], limit: float, first: bool, beside: bool = False
     ) -> tuple[Scored | None, tuple[str, ...]]:
-        """The effect to accept, fitted with all parameters, if any; why each that was tried was not, "" for it."""
+        """The effect to accept, fitted with all parameters, if any; why each that was tried was not, "" for it.
+
+        ``first``: no effect is in the model yet. ``beside``: they are further parts of one that is.
+        """
         objections: list[str] = []
         doubtful: Scored | None = None
         for one in near_best(scored):
-            why = objection(self.evidence(one), limit, first)
+            evidence = self.evidence(one)
+            why = objection_beside(evidence, limit) if beside else objection(evidence, limit, first)
             if not why:
                 self.say(f"fitting {one.candidate.name} with all parameters")
                 one = polish(self.bench, one, self.current, self.held)

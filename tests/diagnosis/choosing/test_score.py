@@ -1,0 +1,201 @@
+"""A candidate's fit: where it starts, which columns it keeps, which of two fits counts, and what it scores."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.analytic import DECLARED, bench, candidates, unknowns
+from thsa_cosim.diagnosis.choosing import score as room
+from thsa_cosim.diagnosis.choosing.score import (
+    ENOUGH,
+    Scored,
+    fixed_shapes,
+    go_on,
+    polish,
+    score,
+)
+from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.fitting.fit import Fit, refine
+from thsa_cosim.diagnosis.fitting.structure import structure
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
+
+MEMBERS = (
+    Unknown("p", "p", "1", 1.0, 0.5, 1.0, 0.0, 9.0),
+    Unknown("a", "a", "1", 0.0, np.inf, 1.0, -9.0, 9.0, declared=False),
+)
+SAMPLES = 100
+
+
+def fit(p: float, misfit: float, cost: float, *, converged: bool = False) -> Fit:
+    """A fit with a mean squared residual of ``misfit``."""
+    residual = np.full(SAMPLES, np.sqrt(misfit))
+    vector, jacobian, steps = np.array([p, 4.0]), np.ones((SAMPLES, 2)), np.array([0.1, 0.2])
+    return Fit(Unknowns(MEMBERS), vector, residual, jacobian, steps, cost, converged)
+
+
+def scored(own: Fit) -> Scored:
+    nothing: Any = SimpleNamespace()
+    return Scored(nothing, own, own.residual, 1.0, 1.0, 1.0, 1.0)
+
+
+@pytest.fixture
+def fits(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """``refine`` gives what is in ``queue``, one after the other, and keeps what it was ``asked``."""
+    own = SimpleNamespace(queue=[], asked=[])
+
+    def refined(*given: Any, **more: Any) -> Fit | None:
+        own.asked.append((given, more))
+        return own.queue.pop(0)
+
+    monkeypatch.setattr(room, "refine", refined)
+    monkeypatch.setattr(
+        room,
+        "_scored",
+        lambda bench, proposal, found, current, held: replace(scored(found), proposal=proposal),
+    )
+    return own
+
+
+HELD = np.zeros(SAMPLES)
+
+
+def test_a_fit_down_to_the_noise_is_polished_once_from_where_it_is(fits: Any):
+    choice, current = scored(fit(2.0, 3.0, 300.0)), fit(1.0, 9.0, 900.0)
+    bench: Any = object()
+    fits.queue = [fit(2.1, ENOUGH, 100.0)]
+    found = polish(bench, choice, current, HELD)
+    assert found.fit.vector[0] == 2.1
+    assert found.proposal is choice.proposal
+    ((given, more),) = fits.asked
+    assert given[0] is bench
+    assert given[1] is choice.fit.unknowns
+    assert given[2] is choice.fit.vector
+    assert more == {"steps": choice.fit.steps}
+
+
+@pytest.mark.parametrize(("costs", "expected"), [((150.0, 120.0), 1.5), ((120.0, 150.0), 2.1)])
+def test_a_fit_that_leaves_more_is_tried_from_the_drawing_too_and_the_better_one_counts(
+    fits: Any, costs: tuple[float, float], expected: float
+):
+    choice = scored(fit(2.0, 3.0, 300.0))
+    bench: Any = object()
+    fits.queue = [fit(2.1, 1.001 * ENOUGH, costs[0]), fit(1.5, 1.2, costs[1])]
+    assert polish(bench, choice, choice.fit, HELD).fit.vector[0] == expected
+    given, more = fits.asked[1]
+    assert given[0] is bench
+    assert given[1] is choice.fit.unknowns
+    np.testing.assert_array_equal(
+        given[2], [1.0, 4.0]
+    )  # the declared one from the drawing, the effect's as found
+    assert more == {}
+
+
+def test_a_polish_that_fails_leaves_what_there_was(fits: Any, monkeypatch: pytest.MonkeyPatch):
+    choice = scored(fit(2.0, 3.0, 300.0))
+    nothing: Any = None
+    fits.queue = [None, fit(1.5, 1.2, 120.0)]
+    assert polish(nothing, choice, choice.fit, HELD).fit.vector[0] == 1.5
+    fits.queue = [None, None]
+    assert polish(nothing, choice, choice.fit, HELD) is choice
+    monkeypatch.setattr(room, "_scored", lambda *given: None)
+    fits.queue = [fit(2.1, 1.0, 100.0)]
+    assert polish(nothing, choice, choice.fit, HELD) is choice, (
+        "the held-out recordings cannot be simulated there"
+    )
+
+
+def test_going_on_keeps_the_declared_columns_and_stops_where_it_converged(
+    fits: Any, monkeypatch: pytest.MonkeyPatch
+):
+    choice = scored(fit(2.0, 3.0, 300.0))
+    declared = Fit(Unknowns(MEMBERS[:1]), np.ones(1), HELD, np.ones((SAMPLES, 1)), np.ones(1), 0.0, True)
+    bench: Any = object()
+    fits.queue = [fit(2.2, 1.0, 100.0)]
+    assert go_on(bench, choice, declared, HELD).fit.vector[0] == 2.2
+    ((given, more),) = fits.asked
+    assert given[0] is bench
+    assert given[2] is choice.fit.vector
+    assert more["residual"] is choice.fit.residual
+    assert more["jacobian"] is choice.fit.jacobian
+    assert more["steps"] is choice.fit.steps
+    assert (more["fresh"], more["iterations"], more["enough"]) == ([1], 4, 3.0)
+    done = scored(fit(2.0, 3.0, 300.0, converged=True))
+    assert go_on(bench, done, declared, HELD) is done
+    fits.queue = [None]
+    assert go_on(bench, choice, declared, HELD) is choice
+    monkeypatch.setattr(room, "_scored", lambda *given: None)
+    fits.queue = [fit(2.2, 1.0, 100.0)]
+    assert go_on(bench, choice, declared, HELD) is choice
+
+
+WINDAGE = {"motorEffect.windage.b_q": 2e-3}
+
+
+def proposed(amplitude: float) -> Proposal:
+    (candidate,) = candidates("windage")
+    one = np.ones((1, 1))
+    return Proposal(candidate, {}, one, 1.0, np.array([amplitude]), 1.0, one)
+
+
+def test_a_candidate_is_scored_by_what_it_gains_on_both_parts():
+    own, declared = bench(candidates("windage"), WINDAGE), unknowns()
+    base = refine(own, declared, declared.start, iterations=10)
+    assert base is not None
+    held = own.residuals(declared, base.vector[None, :], "validate")[0]
+    assert held is not None
+    found = score(own, base, held, proposed(2e-3))
+    assert found is not None
+    assert found.fit.unknowns.names == (*declared.names, "motorEffect.windage.b_q")
+    assert found.fit.vector[-1] == pytest.approx(2e-3, rel=0.02)
+    assert found.fit_gain == pytest.approx(base.misfit - found.fit.misfit)
+    assert found.held_out_gain == pytest.approx(held @ held - found.validate @ found.validate)
+    assert found.consistency > 3.0
+    trials = own.of("validate")
+    left = structure(trials, found.validate) / structure(trials, held)
+    assert found.share == pytest.approx(1.0 - left)
+    assert found.share > 0.95
+    assert found.candidate is found.proposal.candidate
+    again = score(own, found.fit, found.validate, proposed(0.0))
+    assert again is not None
+    assert again.fit.unknowns.names == found.fit.unknowns.names, "what is in the model is not added again"
+
+
+def test_it_starts_from_the_share_of_the_promise_that_serves_best(monkeypatch: pytest.MonkeyPatch):
+    own, declared = bench(candidates("windage"), WINDAGE), unknowns()
+    base = refine(own, declared, declared.start, iterations=10)
+    assert base is not None
+    held = own.residuals(declared, base.vector[None, :], "validate")[0]
+    assert held is not None
+    started = []
+
+    def refined(bench: Any, unknowns: Any, vector: np.ndarray, **more: Any) -> None:
+        started.append(float(vector[-1]))
+        assert (more["fresh"], more["iterations"], more["enough"]) == ([4], 2, 3.0)
+
+    monkeypatch.setattr(room, "refine", refined)
+    base = replace(base, vector=np.array(list(DECLARED.values())))
+    for promise, start in ((2e-3, 2e-3), (2e-3 / 0.3, 2e-3), (2e-2, 2e-3), (5e-4, 5e-4)):
+        assert score(own, base, held, proposed(promise)) is None
+        assert started.pop() == pytest.approx(start, rel=1e-6)
+
+
+def test_what_cannot_be_simulated_has_no_score():
+    own, declared = bench(candidates("windage"), WINDAGE), unknowns()
+    base = refine(own, declared, declared.start, iterations=10)
+    assert base is not None
+    never: Any = SimpleNamespace(residuals=lambda unknowns, vectors, part: [None] * len(vectors))
+    assert score(never, base, HELD, proposed(2e-3)) is None
+
+
+def test_fixed_shapes_are_those_of_the_accepted_proposals():
+    parameters = (
+        SimpleNamespace(name="n", variable="x.n", fixed=True),
+        SimpleNamespace(name="k", variable="x.k", fixed=False),
+    )
+    proposal = SimpleNamespace(shapes={"n": 7.0, "k": 1.0})
+    made: Any = [SimpleNamespace(candidate=SimpleNamespace(parameters=parameters), proposal=proposal)]
+    assert fixed_shapes(made) == {"x.n": 7.0}
+    assert fixed_shapes([]) == {}

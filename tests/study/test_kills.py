@@ -1,0 +1,219 @@
+"""Studies that are cut short at random moments end with the undisturbed result, whatever kind they are."""
+
+import errno
+import json
+import multiprocessing
+import os
+import random
+import shutil
+import tempfile
+import tomllib
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from matplotlib.figure import Figure
+
+from thsa_cosim.api.conduct import KINDS, ask
+from thsa_cosim.errors import MachineError
+from thsa_cosim.scenario import Executor
+from thsa_cosim.study import Place, Progress
+from thsa_cosim.study.runs import RUNS
+
+ROOT = Path(__file__).parents[2]
+SCENARIOS = ROOT / "scenarios"
+pytestmark = pytest.mark.skipif(
+    not (ROOT / "fmus" / "Screw.fmu").exists(), reason="fmus/Screw.fmu has not been exported"
+)
+#: What may differ between two runs of the same study.
+TIMES = {"duration_s", "started"}
+
+
+@pytest.fixture(autouse=True)
+def no_plots(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Figure, "savefig", lambda self, path, **_: Path(path).touch())
+
+
+class Killed(BaseException):
+    """Nothing may catch this."""
+
+
+def shipped(name: str, **changes: Any) -> dict[str, Any]:
+    """A shipped scenario as a dict, its paths made absolute, some of its tables replaced."""
+    data = tomllib.loads((SCENARIOS / name).read_text(encoding="utf-8"))
+    data["fmu"] = str((SCENARIOS / data["fmu"]).resolve())
+    for key, value in changes.items():
+        data[key] = {**data[key], **value} if isinstance(value, dict) else value
+    return data
+
+
+def screw(method: str) -> dict[str, Any]:
+    fit = [str(SCENARIOS / "recordings" / f"screw_{t}.parquet") for t in ("m30", "p25")]
+    held_out = [str(SCENARIOS / "recordings" / "screw_p00.parquet")]
+    search = {"population": 6, "generations": 4, "method": method}
+    return shipped("screw.toml", recordings={"fit": fit, "validate": held_out}, search=search)
+
+
+def table4() -> dict[str, Any]:
+    data = shipped("table4.toml", search={"population": 6, "generations": 3})
+    return {key: value for key, value in data.items() if key not in ("surface", "line")}
+
+
+def simulated() -> dict[str, Any]:
+    return screw("differential-evolution") | {"kind": "identify"}
+
+
+STUDIES: dict[str, tuple[str, Callable[[], dict[str, Any]]]] = {
+    "identify, local searches": ("identify", lambda: screw("local-first")),
+    "identify, evolution": ("identify", lambda: screw("differential-evolution")),
+    "tune": ("tune", table4),
+    "simulate": ("simulate", simulated),
+}
+
+
+def without_times(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {key: without_times(value) for key, value in content.items() if key not in TIMES}
+    return [without_times(member) for member in content] if isinstance(content, list) else content
+
+
+def kill() -> None:
+    raise Killed
+
+
+def run(
+    command: str,
+    data: dict[str, Any],
+    folder: Path,
+    at: int | None = None,
+    happens: Callable[[], None] = kill,
+) -> tuple[Any, int]:
+    """Run the study; ``at`` so much progress something ``happens``; its result and how much progress was told."""
+    told = 0
+
+    def on_progress(_: Progress) -> None:
+        nonlocal told
+        told += 1
+        if told == at:
+            happens()
+
+    asked = ask(command, data, folder=folder)
+    kind = KINDS[command]
+    kind.write(kind.run(asked.scenario, Place(folder, Executor(1), on_progress)), folder)
+    return without_times(json.loads((folder / "result.json").read_text(encoding="utf-8"))), told
+
+
+def kill_often(command: str, data: dict[str, Any], tmp_path: Path, kills: int, seed: int) -> None:
+    whole, told = run(command, data, tmp_path / "whole")
+    chance = random.Random(seed)
+    cut, killed = tmp_path / "cut", 0
+    for _ in range(kills):
+        try:
+            run(command, data, cut, chance.randrange(1, max(told, 2)))
+        except Killed:
+            killed += 1
+        log = cut / RUNS
+        if log.exists() and chance.random() < 0.5:  # a power cut tears the end besides
+            log.write_bytes(log.read_bytes()[: -chance.randrange(1, 200)])
+    assert killed
+    assert run(command, data, cut)[0] == whole
+    assert not (cut / RUNS).exists()
+
+
+@pytest.mark.parametrize(
+    "study", [s if s == "simulate" else pytest.param(s, marks=pytest.mark.slow) for s in STUDIES]
+)
+def test_a_study_that_is_killed_ends_like_the_undisturbed_one(study: str, tmp_path: Path) -> None:
+    command, build = STUDIES[study]
+    kill_often(command, build(), tmp_path, kills=2, seed=len(study))
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("study", STUDIES)
+def test_a_study_that_is_killed_ten_times_ends_like_the_undisturbed_one(study: str, tmp_path: Path) -> None:
+    command, build = STUDIES[study]
+    kill_often(command, build(), tmp_path, kills=10, seed=1)
+
+
+@pytest.mark.slow
+def test_what_was_run_is_not_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second attempt at a tuning that was killed late runs the rest only, within a generation, too."""
+    from thsa_cosim.batch import LocalRunner
+
+    counts: list[int] = []
+    plain = LocalRunner.run
+
+    def counted(self: Any, jobs: Any, on_outcome: Any = None) -> Any:
+        counts.append(len(jobs))
+        return plain(self, jobs, on_outcome)
+
+    _, told = run("tune", table4(), tmp_path / "whole")
+    monkeypatch.setattr(LocalRunner, "run", counted)
+    run("tune", table4(), tmp_path / "undisturbed")
+    undisturbed = sum(counts)
+    with pytest.raises(Killed):
+        run("tune", table4(), tmp_path / "cut", told - 3)
+    counts.clear()
+    run("tune", table4(), tmp_path / "cut")
+    assert 0 < sum(counts) < 0.5 * undisturbed
+
+
+# -- the machine's faults -----------------------------------------------------------------------------
+def full(monkeypatch: pytest.MonkeyPatch, temporary: Path) -> Callable[[], None]:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(zipfile.ZipFile, "extractall", refuse)
+    monkeypatch.setattr(shutil, "copyfileobj", refuse)
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    return lambda: None
+
+
+def noexec(monkeypatch: pytest.MonkeyPatch, temporary: Path) -> Callable[[], None]:
+    real = os.statvfs
+
+    def mounted(path: Any) -> Any:
+        found = real(path)
+        return SimpleNamespace(
+            f_flag=found.f_flag | os.ST_NOEXEC, f_bavail=found.f_bavail, f_frsize=found.f_frsize
+        )
+
+    monkeypatch.setattr(os, "statvfs", mounted)
+    return lambda: None
+
+
+def swept(monkeypatch: pytest.MonkeyPatch, temporary: Path) -> Callable[[], None]:
+    def sweep() -> None:
+        for folder in temporary.glob("thsa-cosim-*"):
+            shutil.rmtree(folder, ignore_errors=True)
+        for process in multiprocessing.active_children():
+            process.kill()
+
+    return sweep
+
+
+FAULTS = {"full": (full, "is full"), "noexec": (noexec, "noexec"), "swept": (swept, "removed while")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_machines_fault_stops_the_study_and_leaves_no_row(fault: str, tmp_path: Path) -> None:
+    """The sentence names the temporary folder; the same command after the repair ends right."""
+    begin, says = FAULTS[fault]
+    data, temporary = screw("differential-evolution"), tmp_path / "temporary"
+    temporary.mkdir()
+    whole, told = run("identify", data, tmp_path / "whole")
+    with pytest.MonkeyPatch.context() as broken:
+        broken.setattr(tempfile, "tempdir", str(temporary))
+        happens = begin(broken, temporary)
+        with pytest.raises(MachineError, match=says) as caught:
+            run("identify", data, tmp_path / "cut", told // 2, happens)
+        assert str(temporary) in str(caught.value)
+        assert "same command again" in str(caught.value)
+    journal = tmp_path / "cut" / "journal.csv"
+    rows = journal.read_text().splitlines()[1:] if journal.exists() else []
+    assert not [row for row in rows if "inf" in row]
+    assert run("identify", data, tmp_path / "cut")[0] == whole

@@ -11,7 +11,7 @@ from thsa_cosim.batch import Experiment, Job, Outcome
 from thsa_cosim.identify.evaluate import planned_vectors
 from thsa_cosim.identify.problem import build_case
 from thsa_cosim.parameters import ParameterSpace
-from thsa_cosim.scenario import AnyScenario, Executor, Scenario, SimulationSpec, StagedScenario, TuneScenario
+from thsa_cosim.scenario import AnyScenario, Executor, Scenario, SimulationTable, StagedScenario, TuneScenario
 from thsa_cosim.tune.problem import build_groups
 
 SAMPLE = 12
@@ -131,7 +131,7 @@ def _timed(
     searches: Sequence[Search],
     also: int,
     asks: Sequence[Ask],
-    simulation: SimulationSpec,
+    simulation: SimulationTable,
     seed: int,
     executor: Executor,
 ) -> Forecast:

@@ -89,6 +89,7 @@ def scenario_of(recording: Path, *, linear: bool) -> Scenario:
     scenario = load_scenario(SCENARIO, fit=[recording])
     scenario = replace(
         scenario,
+        search=replace(scenario.search, method="differential-evolution"),
         cost=replace(
             scenario.cost,
             channels={name: scenario.cost.channels[name] for name in CHANNELS},

@@ -104,7 +104,7 @@ def run(
             measured(truth, temperature, (sorted(FOUND).index(bench), seed), correlation).to_parquet(path)
             scenario = load_scenario(REPO / "scenarios" / f"{bench}.toml", fit=[path], seed=seed)
             # The polish ends in the same minimum from a shorter search.
-            short = replace(scenario.search, population=12, generations=5)
+            short = scenario.search.model_copy(update={"population": 12, "generations": 5})
             result = identify(
                 replace(scenario, search=short), Place(Path(folder) / "study", Executor(workers))
             )

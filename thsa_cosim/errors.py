@@ -19,6 +19,7 @@ no exception but an outcome (``thsa_cosim.batch``).
 """
 
 import difflib
+import importlib.util
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -72,6 +73,12 @@ class MachineError(ThsaCosimError):
     """
 
     exit_code = 3
+
+
+def require(module: str, feature: str, extra: str) -> None:
+    """MissingExtraError, naming ``extra``, unless ``module`` is installed."""
+    if importlib.util.find_spec(module) is None:
+        raise MissingExtraError(feature, extra)
 
 
 class StudyError(ThsaCosimError):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thsa_cosim.errors import did_you_mean
+from thsa_cosim.errors import did_you_mean, require
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,6 +125,7 @@ class Signals:
 
     def to_frame(self) -> "pd.DataFrame":
         """Return a table with index ``time [s]`` and one column ``name [unit]`` per signal."""
+        require("pandas", "A table", "notebook")
         import pandas as pd  # workers use signals, too, and need no tables
 
         columns = {f"{n} [{self.units[n]}]": v for n, v in self.values.items()}

@@ -10,7 +10,7 @@ from thsa_cosim.batch.handling import largest_change, try_input_handling
 from thsa_cosim.errors import ParameterError
 from thsa_cosim.fmu import Plant
 from thsa_cosim.scenario.handling import settle_handling
-from thsa_cosim.scenario.model import SimulationSpec
+from thsa_cosim.scenario.model import SimulationTable
 from thsa_cosim.signals import Signals
 
 TIME = np.linspace(0.0, 1.0, 201)
@@ -44,11 +44,11 @@ def test_derivatives_that_are_declared_but_wrong_are_not_used() -> None:
 
 def test_a_foreign_fmu_is_tried_ours_is_trusted_and_a_key_fixes_it() -> None:
     foreign, ours = experiment("WRONG_SLOPE"), experiment(tool="thsa-cosim tests")
-    assert settle_handling(SimulationSpec(), [ours]).modes == (None,)
-    settled = settle_handling(SimulationSpec(), [foreign, foreign])
+    assert settle_handling(SimulationTable(), [ours]).modes == (None,)
+    settled = settle_handling(SimulationTable(), [foreign, foreign])
     assert settled.modes == ("mean", "mean")
     assert "WARNING" not in settled.notes[0]
-    fixed = settle_handling(SimulationSpec(inputs="derivative"), [foreign])
+    fixed = settle_handling(SimulationTable(inputs="derivative"), [foreign])
     assert fixed.modes == ("derivative",)
     assert "WARNING: y of this Co-Simulation is" in fixed.notes[0]
     with LocalRunner([foreign], backend="python") as runner:

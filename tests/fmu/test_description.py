@@ -3,6 +3,7 @@
 import pickle
 import stat
 import zipfile
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,8 @@ def test_fmi3_description_has_aliases_arrays_and_intermediate_update() -> None:
     assert [v.name for v in d.outputs] == ["y", "feed", "count"]
     assert d.capabilities["providesDirectionalDerivative"] is True
     assert d.variables["vector"].is_array
+    assert d.variables["vector[2]"].element == (13, 1, 2)
+    assert [v.name for v in d.parameters if v.name.startswith("vector")] == ["vector[1]", "vector[2]"]
     assert d.variables["u"].intermediate_update
     assert not d.variables["single"].intermediate_update
     assert (d.states, d.event_indicators) == (1, 1)
@@ -153,4 +156,22 @@ def test_damaged_archive_leaves_no_folder(tmp_path: Path) -> None:
     path.write_bytes(bytes(damaged))
     with pytest.raises(FmuError, match="cannot be unpacked"):
         unpack(path, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_archives_that_unpack_to_much_more_than_they_are_are_refused(tmp_path: Path) -> None:
+    """Sizes as an archive states them: nothing of that size is made or read here."""
+    path = tmp_path / "bomb.fmu"
+    for name, size, says in (
+        ("resources/zeros.bin", 3 * 2**30, "would unpack to 3.0 GiB from 0.0 MiB"),
+        ("modelDescription.xml", 2 * 2**30 - 1, "modelDescription.xml has 2048 MiB in an archive"),
+    ):
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr(name, b"x" * 1000)
+            archive.getinfo(name).file_size = size
+        refuse = (
+            read_description if name == "modelDescription.xml" else partial(unpack, folder=tmp_path / "out")
+        )
+        with pytest.raises(FmuError, match=says):
+            refuse(path)
     assert not (tmp_path / "out").exists()

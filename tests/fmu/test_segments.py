@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thsa_cosim.fmu.description import Variable
-from thsa_cosim.fmu.segments import MERGED, Segments, segments, vertices
+from thsa_cosim.fmu.segments import MERGED, Segments, merging_tolerance, segments, vertices
 from thsa_cosim.signals import FloatArray, Signals
 
 
@@ -41,6 +41,29 @@ def test_a_rounded_ramp_is_one_stretch_and_a_corner_is_kept() -> None:
     assert not found.jumps.any()
     assert np.abs(at(found, time)[:, 0] - np.round(exact, 9)).max() <= MERGED * 18e-3
     assert len(cut(time, {"v": np.round(exact, 9)}, set(), time, merged=0.0)) > 100
+
+
+def test_a_computed_course_keeps_its_bends() -> None:
+    """No rounding to leave out: a smooth reference is followed to 1e-10 of its range."""
+    time = np.linspace(0.0, 3.0, 3001)
+    smooth = 0.1 * np.sin(2.0 * time) ** 3
+    found = cut(time, {"q": smooth}, set(), time)
+    assert np.abs(at(found, time)[:, 0] - smooth).max() <= 1.01e-10 * np.ptp(smooth)
+    assert len(found) > 1000
+
+
+@pytest.mark.parametrize("digits", [7, 8, 9])
+def test_the_tolerance_is_the_rounding_of_the_samples(digits: int) -> None:
+    ramps = np.interp(np.arange(5000.0), [0.0, 1003.0, 2511.3, 5000.0], [0.0, 0.0, 9.0, -4.0])
+    assert 1.0 < merging_tolerance(np.round(ramps, digits)) / 10.0**-digits < 4.0
+    assert merging_tolerance(ramps.astype(np.float32).astype(float)) < 4 * np.spacing(np.float32(9.0))
+
+
+def test_noise_is_not_taken_for_rounding() -> None:
+    noisy = np.linspace(0.0, 1.0, 500) + 1e-3 * np.random.default_rng(1).normal(size=500)
+    assert merging_tolerance(noisy) == pytest.approx(MERGED * np.ptp(noisy))
+    assert merging_tolerance(np.full(9, 3.0)) == 0.0
+    assert merging_tolerance(noisy, merged=0.0) == 0.0
 
 
 def test_nothing_is_left_out_of_a_course_that_bends_everywhere() -> None:

@@ -44,6 +44,53 @@ FAULTS = {
 }
 """Values of the parameter ``fault`` of lag2.c."""
 
+HOSTILE = (
+    "write to low descriptors",
+    "write to all descriptors",
+    "close low descriptors",
+    "close all descriptors",
+    "fork and return twice",
+    "child that runs on",
+    "child in a session of its own",
+    "thread that crashes later",
+    "thread that exits later",
+    "rounding mode",
+    "floating-point traps",
+    "environment",
+    "no environment",
+    "change directory",
+    "remove directory",
+    "file mask",
+    "locale",
+    "signal handlers",
+    "alarm later",
+    "close standard descriptors",
+    "replace standard descriptors",
+    "flood",
+    "kill itself",
+    "stop itself",
+    "kill its parent",
+    "delete its library",
+    "truncate its library",
+    "delete the worker's folder",
+    "exit",
+    "exit at once",
+    "stack overflow",
+    "floating-point exception",
+    "illegal instruction",
+    "end the main thread",
+    "sleep for ever",
+    "30 GB",
+    "block signals",
+    "few descriptors",
+    "terminate its group",
+    "read from all descriptors",
+    "abort at exit",
+    "leave files open",
+    "thread that burns",
+)
+"""What ``fault`` 100, 101, ... of lag2.c do; see hostile.h."""
+
 LAG2 = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="Lag" guid="{guid}" generationTool="thsa-cosim tests"
   numberOfEventIndicators="0">

@@ -19,7 +19,7 @@ from thsa_cosim.identify.results import ChannelError, Comparison, Estimate, Poin
 from thsa_cosim.laws import published_law
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.report.parameter_files import modelica_record
-from thsa_cosim.scenario import LawSpec
+from thsa_cosim.scenario import LawTable
 from thsa_cosim.signals import Signals
 from thsa_cosim.ssv import ParameterSet
 
@@ -169,27 +169,29 @@ POINTS = [point(t, R=1.0 + 0.1 * t) for t in (-20.0, 0.0, 10.0, 30.0)]
 
 
 def test_laws_are_fitted_as_wanted_or_selected() -> None:
-    laws, notes = fit_laws(POINTS, {"R": LawSpec("quadratic", (1.0, 0.2), "linear")})
+    laws, notes = fit_laws(
+        POINTS, {"R": LawTable(form="quadratic", published=[1.0, 0.2], published_form="linear")}
+    )
     assert notes == []
     assert laws["R"].law.form == "quadratic"
     assert not laws["R"].selected
     assert laws["R"].deviation == pytest.approx(3.0 / 7.0)
-    chosen, _ = fit_laws(POINTS, {"R": LawSpec()})
+    chosen, _ = fit_laws(POINTS, {"R": LawTable()})
     assert chosen["R"].selected
     assert chosen["R"].law.form == "linear"
     assert chosen["R"].deviation is None
 
 
 def test_too_few_points_for_a_law_is_a_note() -> None:
-    laws, notes = fit_laws(POINTS[:3], {"R": LawSpec("cubic")})
+    laws, notes = fit_laws(POINTS[:3], {"R": LawTable(form="cubic")})
     assert laws == {}
     assert notes == ["R has no cubic law: that needs 4 temperatures, there are 3."]
-    laws, notes = fit_laws([point(None, R=1.0)], {"R": LawSpec("constant")})
+    laws, notes = fit_laws([point(None, R=1.0)], {"R": LawTable(form="constant")})
     assert "fewer than two temperatures" in notes[0]
 
 
 def test_values_come_from_the_own_point_or_else_from_the_laws() -> None:
-    laws, _ = fit_laws(POINTS, {"R": LawSpec("linear")})
+    laws, _ = fit_laws(POINTS, {"R": LawTable(form="linear")})
     assert values_at(10.3, ["R"], POINTS, laws, 1.0) == {"R": 2.0}
     assert values_at(20.0, ["R"], POINTS, laws, 1.0)["R"] == pytest.approx(3.0)
     assert values_at(None, ["R"], [point(None, R=4.0)], {}, 1.0) == {"R": 4.0}
@@ -224,7 +226,7 @@ BLOCK = [f"m.R.{c}" for c in ("a0", "a1", "a2", "a3", "alpha1", "beta1", "alpha2
 
 def test_a_law_becomes_the_start_values_of_its_block_in_the_fmus_unit() -> None:
     space = ParameterSpace((Parameter("R", "m.R.a0", "mOhm", 0.0, 9e3, variable_unit="Ohm"),))
-    laws, _ = fit_laws(POINTS, {"R": LawSpec("linear")})
+    laws, _ = fit_laws(POINTS, {"R": LawTable(form="linear")})
     found, notes = parameter_set("set", space, POINTS, laws, description(*BLOCK))
     assert notes == []
     assert set(found.values) == set(BLOCK)

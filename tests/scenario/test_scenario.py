@@ -61,7 +61,7 @@ def test_a_valid_scenario_in_full(folder):
     assert scenario.parameters["R_s"].description == "about motor.R_s.a0"
     assert scenario.parameters.assignments({"R_s": 1.0, "J": 2.0}) == {"motor.R_s.a0": 1.0, "motor.J": 2e-3}
     law = scenario.laws["R_s"]
-    assert (law.form, law.published, law.published_form) == ("linear", (1.2, 0.03), "linear")
+    assert (law.form, law.published, law.compared_form) == ("linear", [1.2, 0.03], "linear")
     assert scenario.cost.channels["w_m"].noise == 0.2
     assert scenario.cost.channels["i_q"].weight == 2.0
     assert (scenario.cost.start, scenario.cost.stop, scenario.cost.mask) == (0.0, 0.4, ((0.1, 0.12),))

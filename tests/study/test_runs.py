@@ -12,7 +12,7 @@ import pytest
 
 from thsa_cosim.batch import Experiment, Job, Outcome, Status
 from thsa_cosim.errors import InputError, MachineError
-from thsa_cosim.scenario import SimulationSpec
+from thsa_cosim.scenario import SimulationTable
 from thsa_cosim.signals import Signals
 from thsa_cosim.study import Place, Study, runs
 from thsa_cosim.study.runs import RUNS, LoggedRunner, RunLog
@@ -240,7 +240,7 @@ def test_a_complete_study_keeps_no_log(tmp_path: Path, experiment: Experiment) -
 
     place = Place(tmp_path / "study", Executor())  # type: ignore[arg-type]
     with Study.open(place, {"kind": "simulate"}, {}) as study:
-        with study.open_runner(SimulationSpec(), [experiment]) as runner:
+        with study.open_runner(SimulationTable(), [experiment]) as runner:
             runner.run([Job("fit/a", {"seed": 1.0})])
         assert (place.folder / RUNS).stat().st_size > 100
         study.complete()

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from thsa_cosim.api.study import Study, frame
-from thsa_cosim.errors import InputError, did_you_mean
+from thsa_cosim.errors import InputError, did_you_mean, require
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,6 +36,7 @@ class IdentifyStudy(Study):
     @property
     def laws(self) -> "pd.DataFrame":
         """Index parameter; form, coefficients (from α0 up, or α1, β1, α2, β2), published ones, deviation."""
+        require("pandas", "A table", "notebook")
         import pandas as pd
 
         rows = {
@@ -81,6 +82,7 @@ class TuneStudy(Study):
     @property
     def parameters(self) -> "pd.DataFrame":
         """The gains: index parameter; value after and before, unit."""
+        require("pandas", "A table", "notebook")
         import pandas as pd
 
         before = (self.result["before"] or {}).get("gains", {})
@@ -93,6 +95,7 @@ class TuneStudy(Study):
     @property
     def terms(self) -> "pd.DataFrame":
         """Terms of cost and requirements: one row a term, one column a set of gains, then its unit."""
+        require("pandas", "A table", "notebook")
         import pandas as pd
 
         sets = {"before": self.result["before"], **self.result["compare"], "after": self.result["after"]}
@@ -105,6 +108,7 @@ class TuneStudy(Study):
     @property
     def schedule(self) -> "pd.DataFrame":
         """Gains over the conditions, one row a node; empty if none was asked for."""
+        require("pandas", "A table", "notebook")
         import pandas as pd
 
         return pd.DataFrame(self.result.get("schedule") or [])
@@ -145,6 +149,7 @@ class DiagnoseStudy(Study):
     @property
     def held_out(self) -> "pd.DataFrame":
         """Errors of the recordings that no fit touched: index signal; rmse before and after, noise."""
+        require("pandas", "A table", "notebook")
         import pandas as pd
 
         before, after = ((self.result[key] or {}).get("validate", {}) for key in ("before", "after"))

@@ -4,6 +4,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from thsa_cosim.errors import require
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -13,6 +15,7 @@ def list_studies(folder: Path | str = "studies") -> "pd.DataFrame":
 
     Raises InputError if there is no such folder.
     """
+    require("pandas", "A table", "notebook")
     import pandas as pd
 
     from thsa_cosim.report.compare import list_studies as listed
@@ -30,6 +33,7 @@ def compare(*folders: Path | str) -> "pd.DataFrame":
 
     Raises InputError as :func:`thsa_cosim.report.compare.compare`.
     """
+    require("pandas", "A table", "notebook")
     import pandas as pd
 
     from thsa_cosim.report.compare import compare as compared

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thsa_cosim.errors import InputError, did_you_mean
+from thsa_cosim.errors import InputError, did_you_mean, require
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,6 +50,7 @@ class Study:
     @property
     def failures(self) -> "pd.Series[int]":
         """Failed simulations by reason."""
+        require("pandas", "A table", "notebook")
         import pandas as pd
 
         return pd.Series(dict(self.result.get("failures", {})), dtype="int64", name="simulations")
@@ -80,6 +81,7 @@ class Study:
 
         Raises InputError for a recording that the study does not hold.
         """
+        require("pandas", "A table", "notebook")
         import pandas as pd
 
         found = self._file(recording)
@@ -95,6 +97,7 @@ class Study:
     @property
     def journal(self) -> "pd.DataFrame":
         """Every vector that was evaluated, in order; empty for a study without a search."""
+        require("pandas", "A table", "notebook")
         import pandas as pd
 
         files = sorted({*self.folder.glob("journal.csv"), *self.folder.glob("*/journal.csv")})
@@ -110,6 +113,7 @@ class Study:
 
         Raises InputError if there is nothing of that name.
         """
+        require("matplotlib", "A plot", "notebook")
         from thsa_cosim.report.parts.drawing import draw
 
         known = self._figures
@@ -174,6 +178,7 @@ def frame(
     rows: Mapping[tuple[Any, ...], Mapping[str, Any]], names: list[str], columns: Sequence[str]
 ) -> "pd.DataFrame":
     """A table of ``rows`` over an index of ``names``; without rows it has its columns still."""
+    require("pandas", "A table", "notebook")
     import pandas as pd
 
     index = pd.MultiIndex.from_tuples(list(rows) or [("",) * len(names)], names=names)

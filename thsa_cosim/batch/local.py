@@ -30,10 +30,11 @@ _START_LIMIT_S = 180.0
 _FAILED_STARTS = 3
 _CLOSE_S = 2.0
 _AHEAD_S = 0.02
-_SILENT_TICKS = 200
+_SILENT_TICKS = 60
 _SILENT = (Status.EXIT, "the answer of the worker did not arrive: the FMU spoilt its pipe")
 _GARBLED = (Status.EXIT, "the FMU wrote into the worker's pipe")
-_CHANNEL = (_SILENT, _GARBLED)
+_CLOSED = (Status.EXIT, "the FMU closed the worker's pipe")
+_CHANNEL = (_SILENT, _GARBLED, _CLOSED)
 _AHEAD = 32
 """A worker has at hand what keeps it busy for _AHEAD_S, at most _AHEAD orders."""
 
@@ -257,7 +258,7 @@ class LocalRunner:
             case Returned(serials=serials):
                 self._returned(worker, serials, batch)
             case None:
-                self._died(worker, batch, None)
+                self._died(worker, batch, None if worker.ends_within(1.0) else _CLOSED)
             case _:
                 self._died(worker, batch, _GARBLED)
 
@@ -366,7 +367,8 @@ class LocalRunner:
         outcome = Outcome(status, f"{reason} {progress.where}", None, None, lasted, console)
         own = cause is None or cause in _CHANNEL
         fault = fault_of(outcome, self._study.trouble() if own else None)
-        killed_by = signal_name(code) if cause is None else ""
+        # Who kills the supervisor too has been looked for from inside: it is small, and holds no data.
+        killed_by = signal_name(code) if cause is None and not worker.lost_supervisor else ""
         return Attempt(outcome, fault, killed_by, own, progress.place, was_first=worker.runs == 0)
 
     def _cause_of_death(self, code: int, progress: Progress) -> tuple[Status, str]:

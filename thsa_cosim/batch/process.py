@@ -72,6 +72,8 @@ class WorkerProcess:
         """Orders that it was ever given; a fresh worker has had none."""
         self.silent_ticks = 0
         """How often it was seen between two jobs while an answer was awaited."""
+        self.lost_supervisor = False
+        """Whether ``reap`` found that the supervisor did not end by itself."""
         self.worker_pid = 0
         """0 until it is ready."""
         self._outbox = b""
@@ -199,6 +201,7 @@ class WorkerProcess:
             if self._process.returncode == -signal.SIGKILL and os.name != "nt":
                 # It may be the supervisor itself that was killed.
                 supervisor.end_family(str(self.folder))
+        self.lost_supervisor = os.name != "nt" and not (self.folder / supervisor.ENDED).exists()
         self.last_progress = self.progress()
         with contextlib.suppress(OSError):
             self._stdin.close()
@@ -218,9 +221,14 @@ class WorkerProcess:
         """Tell the worker to end after the orders that it has."""
         self._send(Stop())
 
+    def ends_within(self, patience_s: float) -> bool:
+        """Wait for the worker to end by itself; return whether it did."""
+        until = time.monotonic() + patience_s
+        while not (died := self.has_died()) and time.monotonic() < until:
+            time.sleep(0.002)
+        return died
+
     def join(self, patience_s: float) -> int:
         """Wait for the worker to end by itself, then reap it."""
-        until = time.monotonic() + patience_s
-        while not self.has_died() and time.monotonic() < until:
-            time.sleep(0.002)
+        self.ends_within(patience_s)
         return self.reap()

@@ -18,6 +18,8 @@ from typing import NoReturn
 
 TAG = "THSA_COSIM_WORKER"
 """Environment variable that all descendants of a worker have; its value is the worker's folder."""
+ENDED = "ended"
+"""File in a worker's folder that its supervisor leaves; without it the supervisor itself was killed."""
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 
 
@@ -77,6 +79,8 @@ def _supervise(worker: int, folder: str, root: str) -> NoReturn:
                 os.kill(worker, signal.SIGKILL)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     _, status = os.waitpid(worker, 0)
+    with contextlib.suppress(OSError), open(os.path.join(folder, ENDED), "wb"):  # noqa: PTH118, PTH123
+        pass
     end_family(root if orphaned else folder)
     until = time.monotonic() + 1.0
     with contextlib.suppress(ChildProcessError):

@@ -74,7 +74,7 @@ class Surroundings:
         try:
             os.chdir(self._cwd)
         except OSError:  # the FMU has removed it
-            self._cwd.mkdir(exist_ok=True)
+            self._cwd.mkdir(parents=True, exist_ok=True)
             os.chdir(self._cwd)
 
     def leave_if_forked(self) -> None:
@@ -92,6 +92,7 @@ class Surroundings:
         self.leave_if_forked()
         self.floating_point()
         os.umask(self._mask)
+        self.prepare()
         if hasattr(signal, "setitimer"):
             signal.setitimer(signal.ITIMER_REAL, 0.0)
         if self._libc is not None:
@@ -101,6 +102,8 @@ class Surroundings:
         if any(_identity(d) != known for d, known in self._channels.items()):
             return "the FMU closed or replaced the worker's descriptors"
         self._restore_standard()
+        if not (self._cwd.parent / "progress").exists():
+            return "the FMU deleted the worker's folder"
         return self._children()
 
     # -- parts ------------------------------------------------------------------------------------------

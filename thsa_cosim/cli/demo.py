@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from thsa_cosim.api import DiagnoseStudy, IdentifyStudy, TuneStudy, open_study
+from thsa_cosim.api import open_study
 from thsa_cosim.cli.options import PATH, console
 from thsa_cosim.errors import StudyError
 from thsa_cosim.shipped import copy_example
@@ -142,12 +143,7 @@ def _effects(step: Step) -> tuple[str, ...]:
     """The effects that a diagnosis named."""
     if step.words[0] != "diagnose" or step.folder is None:
         return ()
-    study = open_study(step.folder)
-    return (
-        tuple(dict.fromkeys(study.effects.index.get_level_values("effect")))
-        if isinstance(study, DiagnoseStudy)
-        else ()
-    )
+    return tuple(str(effect["name"]) for effect in open_study(step.folder).result["effects"])
 
 
 def _run(step: Step) -> None:
@@ -172,48 +168,47 @@ def _checked(file: Path) -> list[str]:
 
 
 def _identified(folder: Path) -> list[str]:
-    study = open_study(folder)
-    assert isinstance(study, IdentifyStudy)
-    laws, errors = study.laws, study.recordings["rmse / noise"].groupby(level="signal").mean()
-    away = ", ".join(f"{name} {100.0 * value:.2g} %" for name, value in laws["largest deviation"].items())
-    left = ", ".join(f"{name} {value:.2f}" for name, value in errors.items())
-    points = study.parameters.index.get_level_values("point").nunique()
+    result = open_study(folder).result
+    away = {name: (law.get("largest_deviation") or {}).get("law") for name, law in result["laws"].items()}
+    told = ", ".join(f"{name} {100.0 * value:.2g} %" for name, value in away.items() if value is not None)
+    ratios: dict[str, list[float]] = {}
+    for recording in result["recordings"]:
+        for name, error in recording["error"].items():
+            ratios.setdefault(name, []).append(error["rmse"] / error["noise"] if error["noise"] else math.nan)
+    left = ", ".join(f"{name} {sum(own) / len(own):.2f}" for name, own in ratios.items())
     return [
-        f"laws from {points} temperatures lie within so much of the published ones: {away}",
+        f"laws from {len(result['points'])} temperatures deviate from the published ones by at most: {told}",
         f"errors left, in units of the sensors' noise: {left}",
     ]
 
 
 def _tuned(folder: Path) -> list[str]:
-    study = open_study(folder)
-    assert isinstance(study, TuneStudy)
-    table, terms = study.parameters, study.terms
-    gains = [
-        f"{n} {table['before'][n]:.3g} → {table['value'][n]:.3g} {table['unit'][n]}" for n in table.index
-    ]
-    shown = ("rise_time", "steady_state_error", "overshoot")
-    units = {n: "" if terms["unit"][n] == "1" else f" {terms['unit'][n]}" for n in shown}
-    change = [
-        f"{n.replace('_', ' ')} {terms['before'][n]:.3g} → {terms['after'][n]:.3g}{units[n]}" for n in shown
-    ]
+    result = open_study(folder).result
+    before, after, units = result["before"], result["after"], result["units"]
+    gains = [f"{n} {before['gains'][n]:.3g} → {v:.3g} {units[n]}" for n, v in after["gains"].items()]
+    change = []
+    for name in ("rise_time", "steady_state_error", "overshoot"):
+        unit = "" if result["term_units"][name] == "1" else f" {result['term_units'][name]}"
+        change.append(f"{name.replace('_', ' ')} {before[name]:.3g} → {after[name]:.3g}{unit}")
     return [f"gains: {', '.join(gains)}", f"response: {', '.join(change)}"]
 
 
 def _diagnosed(folder: Path) -> list[str]:
-    study = open_study(folder)
-    assert isinstance(study, DiagnoseStudy)
-    effects, errors = study.effects, study.held_out
+    result = open_study(folder).result
     found = [
-        f"{effect}: {name} = {value:.3g} ± {stderr:.1g} {unit}"
-        for (effect, name), value, stderr, unit in zip(
-            effects.index.tolist(), effects["value"], effects["stderr"], effects["unit"], strict=True
-        )
+        f"{effect['name']}: {name} = {value['value']:.3g} ± {_known(value.get('stderr')):.1g} {value['unit']}"
+        for effect in result["effects"]
+        for name, value in effect["parameters"].items()
     ]
-    ratios = {key: errors[key] / errors["noise"] for key in ("before", "after")}
-    if not found:  # nothing was added: there is no after
-        ratios["after"] = ratios["before"]
-    left = [f"{n} {ratios['before'][n]:.2f} → {ratios['after'][n]:.2f}" for n in errors.index]
-    return [f"verdict: {study.verdict}", *found, f"held-out errors in units of noise: {', '.join(left)}"]
+    left = []
+    for name, error in result["before"]["validate"].items():
+        after = result["after"]["validate"].get(name, error)  # nothing was added: there is no after
+        left.append(f"{name} {error['rmse'] / error['noise']:.2f} → {after['rmse'] / after['noise']:.2f}")
+    return [f"verdict: {result['verdict']}", *found, f"held-out errors in units of noise: {', '.join(left)}"]
+
+
+def _known(stderr: float | None) -> float:
+    return math.nan if stderr is None else stderr
 
 
 def _data(output: Path) -> Path:

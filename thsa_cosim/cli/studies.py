@@ -42,10 +42,10 @@ def compare(folders: tuple[Path, ...], output: Path | None, as_json: bool) -> No
     from thsa_cosim.report.compare.tables import print_comparison
 
     found = compared(folders)
+    if output is not None:
+        write_comparison(found, output)
+        click.echo(f"page: {output}", err=True)
     if as_json:
         click.echo(json.dumps(found.to_dict(), indent=2))
     else:
         print_comparison(console(), found)
-    if output is not None:
-        write_comparison(found, output)
-        click.echo(f"page: {output}", err=as_json)

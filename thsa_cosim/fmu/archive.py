@@ -12,6 +12,12 @@ from thsa_cosim.fmu.machine import is_machines, temporary_fault
 
 MAXIMUM_UNPACKED_BYTES = 8 * 2**30
 """Above this an archive is taken for a zip bomb."""
+_RATIO = 50
+"""Unpacked to packed size; libraries and texts of real FMUs stay below 20."""
+_ALWAYS_BYTES = 512 * 2**20
+"""So much may be unpacked from however small an archive."""
+_ALWAYS_TEXT = 32 * 2**20
+"""So long may a model description be in however small an archive."""
 
 
 def sha256_of(path: Path) -> str:
@@ -52,8 +58,21 @@ def check_archive(path: Path, archive: zipfile.ZipFile) -> None:
         if stat.S_ISLNK(entry.external_attr >> 16):
             raise FmuError(f"{path} holds the symbolic link {entry.filename!r}; an FMU has no need of links.")
         total += entry.file_size
-    if total > MAXIMUM_UNPACKED_BYTES:
-        raise FmuError(f"{path} would unpack to {total / 2**30:.0f} GiB, which no FMU needs.")
+    packed = path.stat().st_size
+    if total > min(MAXIMUM_UNPACKED_BYTES, max(_ALWAYS_BYTES, _RATIO * packed)):
+        raise FmuError(
+            f"{path} would unpack to {total / 2**30:.1f} GiB from {packed / 2**20:.1f} MiB, which no FMU needs."
+        )
+
+
+def read_text(path: Path, archive: zipfile.ZipFile, name: str) -> bytes:
+    """Return an entry that is to be parsed; KeyError if there is none, FmuError if it is absurdly long."""
+    size, packed = archive.getinfo(name).file_size, path.stat().st_size
+    if size > max(_ALWAYS_TEXT, _RATIO * packed):
+        raise FmuError(
+            f"{path}: {name} has {size / 2**20:.0f} MiB in an archive of {packed / 2**20:.1f} MiB, which no FMU needs."
+        )
+    return archive.read(name)
 
 
 def unpack(path: Path, folder: Path) -> Path:

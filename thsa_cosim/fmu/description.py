@@ -3,15 +3,19 @@
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
+
 from thsa_cosim.errors import FmuError, did_you_mean
-from thsa_cosim.fmu.archive import open_archive, sha256_of
+from thsa_cosim.fmu.archive import open_archive, read_text, sha256_of
 
 FLOAT_TYPES = ("Real", "Float64", "Float32")
+INTEGERS = tuple(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))
+NUMBERS = (*FLOAT_TYPES, *INTEGERS, "Integer", "Boolean", "Enumeration")
 _ATTRIBUTES = (
     "canBeInstantiatedOnlyOncePerProcess",
     "canGetAndSetFMUstate",
@@ -56,8 +60,16 @@ class Variable:
     """FMI 3: may be set inside a communication step (clause 4.2.2)."""
     initial: str | None = None
     """exact, approx, calculated"""
+    element: tuple[int, int, int] | None = None
+    """FMI 3, one element of an array: value reference, index and length of the array; ``value_reference`` is then a
+    number of our own. The array itself has its entry, but is no input, output or parameter."""
     is_alias: bool = False
     """FMI 3: another name of a variable that has its own entry."""
+
+    @property
+    def is_scalar(self) -> bool:
+        """Whether it is a number of its own: no second name, and no array, whose elements are numbers."""
+        return not self.is_alias and not (self.is_array and self.type in NUMBERS)
 
     @property
     def is_float(self) -> bool:
@@ -105,18 +117,20 @@ class FmuDescription:
     @property
     def inputs(self) -> tuple[Variable, ...]:
         """Variables with causality input, in declaration order."""
-        return tuple(v for v in self.variables.values() if v.causality == "input" and not v.is_alias)
+        return tuple(v for v in self.variables.values() if v.causality == "input" and v.is_scalar)
 
     @property
     def outputs(self) -> tuple[Variable, ...]:
         """Variables with causality output, in declaration order."""
-        return tuple(v for v in self.variables.values() if v.causality == "output" and not v.is_alias)
+        return tuple(v for v in self.variables.values() if v.causality == "output" and v.is_scalar)
 
     @property
     def parameters(self) -> tuple[Variable, ...]:
         """Variables that can be set before initialisation, in declaration order."""
         return tuple(
-            v for v in self.variables.values() if v.causality in ("parameter", "structuralParameter")
+            v
+            for v in self.variables.values()
+            if v.causality in ("parameter", "structuralParameter") and (v.is_scalar or v.is_alias)
         )
 
     def variable(self, name: str) -> Variable:
@@ -137,7 +151,7 @@ def read_description(path: Path | str) -> FmuDescription:
     path = Path(path)
     with open_archive(path) as archive:
         try:
-            xml = archive.read("modelDescription.xml")
+            xml = read_text(path, archive, "modelDescription.xml")
         except KeyError:
             raise FmuError(f"{path} is a zip archive without modelDescription.xml and so no FMU.") from None
         except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, zlib.error) as error:
@@ -152,7 +166,10 @@ def read_description(path: Path | str) -> FmuDescription:
         message = " ".join(str(error).split()) or type(error).__name__
         raise FmuError(f"{path}: modelDescription.xml cannot be read ({message.rstrip('.')}).") from None
     if raw.coSimulation is None and raw.modelExchange is None:
-        raise FmuError(f"{path} offers neither Co-Simulation nor Model Exchange; export it with one of them.")
+        also = " but Scheduled Execution" if getattr(raw, "scheduledExecution", None) is not None else ""
+        raise FmuError(
+            f"{path} offers neither Co-Simulation nor Model Exchange{also}; export it with one of them."
+        )
     co_simulation, model_exchange = raw.coSimulation, raw.modelExchange
     experiment = raw.defaultExperiment
     intermediate = _intermediate_variables(xml)
@@ -166,7 +183,7 @@ def read_description(path: Path | str) -> FmuDescription:
         supports_co_simulation=co_simulation is not None,
         supports_model_exchange=model_exchange is not None,
         capabilities=_capabilities(model_exchange) | _capabilities(co_simulation) | _plural(xml),
-        variables={v.name: _variable(v, intermediate) for v in raw.modelVariables},
+        variables=_variables(raw, intermediate),
         default_experiment=DefaultExperiment()
         if experiment is None
         else DefaultExperiment(
@@ -178,8 +195,8 @@ def read_description(path: Path | str) -> FmuDescription:
         platforms=platforms,
         co_simulation_identifier=getattr(co_simulation, "modelIdentifier", None),
         model_exchange_identifier=getattr(model_exchange, "modelIdentifier", None),
-        states=len(raw.derivatives) or int(raw.numberOfContinuousStates or 0),
-        event_indicators=len(raw.eventIndicators) or int(raw.numberOfEventIndicators or 0),
+        states=_count(raw.derivatives, raw) or int(raw.numberOfContinuousStates or 0),
+        event_indicators=_count(raw.eventIndicators, raw) or int(raw.numberOfEventIndicators or 0),
         state_references=_state_references(raw),
         feedthrough={
             unknown.variable.name: None
@@ -194,7 +211,7 @@ def _state_references(raw: Any) -> tuple[tuple[int, int], ...]:
     pairs = []
     for unknown in raw.derivatives:
         state = getattr(unknown.variable, "derivative", None)
-        if state is None:
+        if state is None or unknown.variable.dimensions:
             return ()
         reference = getattr(state, "valueReference", state)
         pairs.append((int(reference), int(unknown.variable.valueReference)))
@@ -220,6 +237,55 @@ def _plural(xml: bytes) -> dict[str, bool | int]:
         e.get("providesDirectionalDerivatives") for e in root if e.tag.endswith(("Exchange", "Simulation"))
     ]
     return {"providesDirectionalDerivative": any(flag in ("true", "1") for flag in flags)}
+
+
+def _variables(raw: Any, intermediate: set[int]) -> dict[str, Variable]:
+    """All variables by name; arrays as their elements, in row-major order: ``A[1,1]``, ``A[1,2]``, ..."""
+    found: dict[str, Variable] = {}
+    virtual = 0
+    for one in raw.modelVariables:
+        variable = _variable(one, intermediate)
+        shape = _shape(one, raw)
+        found[variable.name] = variable
+        if shape is None or variable.type not in NUMBERS:
+            continue
+        size = int(np.prod(shape))
+        starts = str(one.start or "").split()
+        for index in range(size):
+            where = ",".join(str(int(i) + 1) for i in np.unravel_index(index, shape))
+            start = starts[index] if index < len(starts) else starts[0] if len(starts) == 1 else None
+            found[f"{variable.name}[{where}]"] = replace(
+                variable,
+                name=f"{variable.name}[{where}]",
+                value_reference=virtual,
+                start=_number(start),
+                is_array=False,
+                intermediate_update=False,
+                element=(variable.value_reference, index, size),
+            )
+            virtual += 1
+    return found
+
+
+def _shape(one: Any, raw: Any) -> tuple[int, ...] | None:
+    """Lengths of an array's dimensions, which may be structural parameters' start values; None for a scalar."""
+    if not one.dimensions:
+        return None
+    starts = {int(v.valueReference): v.start for v in raw.modelVariables}
+    lengths = []
+    for dimension in one.dimensions:
+        length = dimension.start
+        if length is None:
+            variable = getattr(dimension, "variable", None)
+            length = starts.get(int(dimension.valueReference)) if variable is None else variable.start
+        lengths.append(int(length or 0))
+    return tuple(lengths)
+
+
+def _count(unknowns: Any, raw: Any) -> int:
+    """How many numbers the variables of a list are together."""
+    shapes = [_shape(unknown.variable, raw) for unknown in unknowns]
+    return sum(1 if shape is None else int(np.prod(shape)) for shape in shapes)
 
 
 def _variable(raw: Any, intermediate: set[int]) -> Variable:

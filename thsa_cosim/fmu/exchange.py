@@ -186,7 +186,7 @@ class _Run:
                 if not self.nx:
                     stop = min(stop, float(times[self.next_row]))
                 before = t
-                if stop - t > slack * 1e-3:
+                if stop - t > slack * 1e-3 and (self.nx or self.nz):
                     t, is_root = solver.step(stop)
                 else:
                     t, is_root = stop, False
@@ -212,6 +212,8 @@ class _Run:
                     signs = self.signs()
                 while self.next_row < len(times) and times[self.next_row] <= t + slack and not self.ends:
                     self.record(t, solver.states)
+            while self.next_row < len(times) and times[self.next_row] <= t + slack:
+                self.record(t, solver.states)  # it ended itself just where the run ends
         finally:
             solver.close()
         if self.next_row < len(times):

@@ -3,13 +3,15 @@
 import ctypes
 import os
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thsa_cosim.fmu.arrays import ArrayAccess
 from thsa_cosim.fmu.failure import SimulationFailure, Status
-from thsa_cosim.fmu.instance import EventInfo, Instance
+from thsa_cosim.fmu.instance import ELEMENTS, EventInfo, Instance
 from thsa_cosim.signals import FloatArray
 
 _Log = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
@@ -40,8 +42,13 @@ class Fmi3Instance(Instance):
     intermediate_references: Sequence[int] = ()
     _log: Any = None
 
+    @cached_property
+    def _arrays(self) -> ArrayAccess:
+        return ArrayAccess(self)
+
     def instantiate(self) -> None:
         """fmi3InstantiateCoSimulation or fmi3InstantiateModelExchange."""
+        self._arrays.forget()
 
         def log(_env: int, status: int, category: bytes, message: bytes) -> None:
             self.messages.add(status, category, message)
@@ -125,7 +132,9 @@ class Fmi3Instance(Instance):
             )
 
     def value_function(self, verb: str, suffix: str) -> Any:
-        """fmi3SetFloat64, fmi3GetInt32, ..."""
+        """fmi3SetFloat64, fmi3GetInt32, ...; for elements of arrays a function of the same kind."""
+        if suffix.endswith(ELEMENTS):
+            return self._arrays.function(verb, suffix.removesuffix(ELEMENTS))
         pointer, size = ctypes.c_void_p, ctypes.c_size_t
         return self.library.function(f"fmi3{verb}{suffix}", pointer, pointer, size, pointer, size)
 

@@ -18,6 +18,9 @@ from thsa_cosim.fmu.native import Library, Messages, MessageSink, failure, libra
 from thsa_cosim.fmu.point import InstancePoint, Point
 from thsa_cosim.signals import FloatArray
 
+ELEMENTS = "Elements"
+"""Ending of a channel's data type whose variables are elements of arrays (FMI 3)."""
+
 
 class Phase(IntEnum):
     """What a plant is doing, for whoever has to explain its death."""
@@ -141,8 +144,10 @@ class Instance(ABC):
                 raise ParameterError(
                     f"{self.description.path}: {variable.name} is {what}; only numbers can be used."
                 )
-            groups.setdefault(self.types[variable.type][0], []).append(column)
+            suffix = self.types[variable.type][0] + (ELEMENTS if variable.element is not None else "")
+            groups.setdefault(suffix, []).append(column)
         dtypes = {suffix: np.dtype(dtype) for suffix, dtype in self.types.values()}
+        dtypes |= {suffix + ELEMENTS: dtype for suffix, dtype in dtypes.items()}
         return [
             Channel(
                 suffix,

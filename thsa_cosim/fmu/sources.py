@@ -16,6 +16,8 @@ from thsa_cosim.fmu.description import read_description
 from thsa_cosim.fmu.native import LIBRARY_SUFFIX, platform_folders
 
 _TIMEOUT_S = 600.0
+_NO_PREFIX = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX", "-DDISABLE_PREFIX")
+"""A shared library exports fmi2DoStep, sources may declare Model_fmi2DoStep (FMI 2.0.4 clause 2.1.1)."""
 
 
 def compile_sources(path: Path, target: Path) -> Path:
@@ -42,7 +44,16 @@ def compile_sources(path: Path, target: Path) -> Path:
             library = output / f"{identifier}{LIBRARY_SUFFIX}"
             _build(
                 path,
-                [*command, "-shared", "-fPIC", "-O2", "-w", *_definitions(folder), *_includes(sources)],
+                [
+                    *command,
+                    "-shared",
+                    "-fPIC",
+                    "-O2",
+                    "-w",
+                    *_NO_PREFIX,
+                    *_definitions(folder),
+                    *_includes(sources),
+                ],
                 [*files, "-o", str(library), "-lm"],
                 sources,
             )

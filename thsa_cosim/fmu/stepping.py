@@ -179,7 +179,14 @@ def step_through(instance: Instance, plan: Plan, progress: FloatArray, compiled:
     else:
         loop = advance_python
     done, what, code = tables.advance(loop, instance, plan, progress)
-    if what:
+    if what and _ends_with_the_run(instance, plan, tables, done, what, code):
+        for channel, table in tables.results:
+            getter = instance.value_function("Get", channel.suffix)
+            row = table[done + 1].ctypes.data
+            access = instance.access(getter, channel.references.ctypes.data, len(channel.references), row)
+            instance.check(access, f"Get{channel.suffix}")
+        _refuse_not_finite(plan, tables.results, done + 1)
+    elif what:
         _explain(instance, plan, tables.results, done, what, code)
     if tables.singles:  # the loop looks at doubles only
         for k in range(len(plan.grid.times)):
@@ -197,6 +204,21 @@ def step_through(instance: Instance, plan: Plan, progress: FloatArray, compiled:
     signals = copy.copy(tables.signals)
     object.__setattr__(signals, "values", values)
     return signals
+
+
+def _ends_with_the_run(
+    instance: Instance, plan: Plan, tables: Tables, done: int, what: int, code: int
+) -> bool:
+    """Whether the FMU asked to terminate in the very last step, having reached its end."""
+    if done != len(plan.grid.steps) - 1:
+        return False
+    last: float | None = None
+    if what == 3 and code == 2 and isinstance(instance, Fmi2Instance):
+        terminated, last = instance.asked_to_stop()
+        last = last if terminated else None
+    elif what == 7:
+        last = float(tables.last[0])
+    return last is not None and last >= plan.grid.times[done] + 0.999 * plan.grid.steps[done]
 
 
 def _refuse_not_finite(plan: Plan, results: Sequence[tuple[Channel, NDArray[Any]]], k: int) -> None:

@@ -20,7 +20,7 @@ FUNCTION = "thsaTrajectory1"
 SAFETY, LOOSEST = 0.5, 5e-6
 """The FMU's solver is given this share of the tolerance, and no larger one. On a grid of samples steps are shorter than
 any tolerance asks for; free ones are as long as it allows. The rig's sensors see 5e-6 of full speed as 0.007 standard
-deviations; what every shipped scenario errs by is printed by ``benchmarks/fmu.py``."""
+deviations; what every shipped scenario errs by is printed by ``benchmarks/stepping.py``."""
 
 
 class Trajectory(ctypes.Structure):

@@ -17,7 +17,7 @@ from thsa_cosim.batch import Experiment, Job, Journal, JournalRow, Outcome, Runn
 from thsa_cosim.costs.channels import ResidualReducer, TermsReducer
 from thsa_cosim.costs.identification import error_terms
 from thsa_cosim.identify.problem import Case, PointProblem
-from thsa_cosim.scenario import SearchSpec
+from thsa_cosim.scenario import SearchTable
 from thsa_cosim.search import LocalSettings
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.study import OnProgress, Progress
@@ -61,7 +61,7 @@ class Reply:
     reasons: tuple[str, ...]
 
 
-def planned_vectors(search: SearchSpec, dimension: int) -> int:
+def planned_vectors(search: SearchTable, dimension: int) -> int:
     """Return how many vectors a search over ``dimension`` parameters may take.
 
     Local searches are expected to agree, each after seven steps with one-sided differences; an evolution to take
@@ -76,7 +76,7 @@ def planned_vectors(search: SearchSpec, dimension: int) -> int:
     return evolved_vectors(search) + 6 * (dimension + 2) + end
 
 
-def evolved_vectors(search: SearchSpec) -> int:
+def evolved_vectors(search: SearchTable) -> int:
     """Return how many vectors an evolution tries at most."""
     return search.population * (search.generations + 1)
 
@@ -163,14 +163,14 @@ class Evaluator:
         self._run(jobs, owners, requests, replies)
         return [reply.freeze() for reply in replies]
 
-    def plan(self, search: SearchSpec) -> None:
+    def plan(self, search: SearchTable) -> None:
         """Expect at every point what ``search`` may take."""
         for k, point in enumerate(self._points):
             self._share[k] = planned_vectors(search, point.space.dimension) * len(point.cases)
         self.planned = sum(self._share)
         self.report()
 
-    def expect_evolution(self, k: int, search: SearchSpec) -> None:
+    def expect_evolution(self, k: int, search: SearchTable) -> None:
         """Point ``k`` needs an evolution that was not planned."""
         further = evolved_vectors(search) * len(self._points[k].cases)
         self._share[k] += further

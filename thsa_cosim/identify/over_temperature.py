@@ -7,11 +7,11 @@ import numpy as np
 from thsa_cosim.errors import InputError
 from thsa_cosim.identify.results import LawResult, PointResult
 from thsa_cosim.laws import FORMS, fit_law, largest_deviation, published_law, select_law
-from thsa_cosim.scenario import LawSpec
+from thsa_cosim.scenario import LawTable
 
 
 def fit_laws(
-    points: Sequence[PointResult], specs: Mapping[str, LawSpec]
+    points: Sequence[PointResult], specs: Mapping[str, LawTable]
 ) -> tuple[dict[str, LawResult], list[str]]:
     """Fit the wanted laws to the points; also return one sentence per law that could not be fitted."""
     laws: dict[str, LawResult] = {}
@@ -36,8 +36,8 @@ def fit_laws(
             best = fit_law(spec.form, t, values, stderr)
         published = None
         deviation = law_deviation = None
-        if spec.published is not None and spec.published_form is not None:
-            published = published_law(spec.published_form, spec.published)
+        if spec.published is not None and spec.compared_form is not None:
+            published = published_law(spec.compared_form, spec.published)
             true = published(t)
             deviation = float(np.max(np.abs(values - true)) / np.max(np.abs(true)))
             law_deviation = largest_deviation(best, published, t)

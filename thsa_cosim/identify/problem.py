@@ -195,5 +195,5 @@ def build_point(scenario: Scenario, point: TemperaturePoint, given: Given | None
         error=scenario.cost.error,
         also=tuple(name for name in scenario.cost.also if name != scenario.cost.error),
         given=given,
-        profile=scenario.search.profile,
+        profile=tuple(scenario.search.profile),
     )

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 from thsa_cosim import __version__
 from thsa_cosim.batch import Experiment, Job, Journal, Runner
@@ -202,7 +202,7 @@ class _Search:
             failures={} if evaluator is None else evaluator.failures,
             parameter_set=identified,
             notes=(*scenario.notes, *failed, *notes, *left_out, *self._notes, *unsaid),
-            settings={**asdict(scenario.search), "error": scenario.cost.error},
+            settings={**scenario.search.model_dump(), "error": scenario.cost.error},
             force=force,
             data=scenario.data,
             trust=judge(self._residuals()),

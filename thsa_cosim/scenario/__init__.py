@@ -16,14 +16,11 @@ from thsa_cosim.scenario.model import (
     CostSpec,
     DiagnoseSpec,
     ForceSpec,
-    LawSpec,
     Scenario,
-    SearchSpec,
-    SimulationSpec,
     TemperaturePoint,
 )
 from thsa_cosim.scenario.recorded import load_scenario
-from thsa_cosim.scenario.schema import KINDS
+from thsa_cosim.scenario.schema import KINDS, LawTable, SearchTable, SimulationTable
 from thsa_cosim.scenario.source import Source
 from thsa_cosim.scenario.stages import Stage, StagedScenario, hand_on
 from thsa_cosim.scenario.table import Table
@@ -40,11 +37,11 @@ __all__ = [
     "DiagnoseSpec",
     "Executor",
     "ForceSpec",
-    "LawSpec",
+    "LawTable",
     "OpenRunner",
     "Scenario",
-    "SearchSpec",
-    "SimulationSpec",
+    "SearchTable",
+    "SimulationTable",
     "Source",
     "Stage",
     "StagedScenario",

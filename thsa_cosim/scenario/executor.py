@@ -9,9 +9,9 @@ from typing import Any
 
 from thsa_cosim.batch import Experiment, LocalRunner, Runner
 from thsa_cosim.scenario.handling import settle_handling
-from thsa_cosim.scenario.model import SimulationSpec
+from thsa_cosim.scenario.schema import SimulationTable
 
-OpenRunner = Callable[[SimulationSpec, Sequence[Experiment]], Runner]
+OpenRunner = Callable[[SimulationTable, Sequence[Experiment]], Runner]
 """Opens processes for experiments, as ``[simulation]`` wants them."""
 
 
@@ -33,7 +33,7 @@ class Executor:
     workers: int = 1
     address: str | None = None
 
-    def open_runner(self, spec: SimulationSpec, experiments: Sequence[Experiment]) -> Runner:
+    def open_runner(self, spec: SimulationTable, experiments: Sequence[Experiment]) -> Runner:
         """Open the processes.
 
         How a foreign FMU is given its inputs is settled first, by a trial where the scenario does not say it; the
@@ -53,7 +53,7 @@ class Executor:
         ]
         limits: dict[str, Any] = {
             "deadline_s": spec.deadline,
-            "memory_limit_mb": spec.memory_mb,
+            "memory_limit_mb": spec.memory,
             "reuse": spec.reuse,
             "stepping": spec.stepping,
             "kind": settled.interface,

@@ -11,7 +11,7 @@ from thsa_cosim.errors import FmuError, ParameterError
 from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.inputs import input_variables, is_linear, is_ours
 from thsa_cosim.fmu.plant import Kind
-from thsa_cosim.scenario.model import SimulationSpec
+from thsa_cosim.scenario.schema import SimulationTable
 from thsa_cosim.system import read_description
 
 WARN = 1e-3
@@ -31,7 +31,7 @@ class Settled:
     notes: tuple[str, ...]
 
 
-def settle_handling(spec: SimulationSpec, experiments: Sequence[Experiment]) -> Settled:
+def settle_handling(spec: SimulationTable, experiments: Sequence[Experiment]) -> Settled:
     """Try each foreign Co-Simulation FMU once on the first of its experiments that has inputs.
 
     The choice depends on the FMU, the scenario and the recordings alone, so that a continued study makes it again.
@@ -61,7 +61,7 @@ def settle_handling(spec: SimulationSpec, experiments: Sequence[Experiment]) -> 
     return Settled(interface, tuple(modes), tuple(note for note in notes if note))
 
 
-def _in_question(spec: SimulationSpec, experiment: Experiment) -> FmuDescription | None:
+def _in_question(spec: SimulationTable, experiment: Experiment) -> FmuDescription | None:
     """The FMU's description if there is anything to find out about its inputs."""
     if spec.interface == "model-exchange" or experiment.inputs is None:
         return None
@@ -76,7 +76,9 @@ def _in_question(spec: SimulationSpec, experiment: Experiment) -> FmuDescription
     return description if foreign and linear else None
 
 
-def _trial(spec: SimulationSpec, description: FmuDescription, experiment: Experiment) -> HandlingTrial | None:
+def _trial(
+    spec: SimulationTable, description: FmuDescription, experiment: Experiment
+) -> HandlingTrial | None:
     assert experiment.inputs is not None
     table = np.array([experiment.inputs[name] for name in experiment.inputs.names])
     moving = np.flatnonzero((np.diff(table, axis=1) != 0.0).any(axis=0))
@@ -95,7 +97,7 @@ def _trial(spec: SimulationSpec, description: FmuDescription, experiment: Experi
     return _trials[key]
 
 
-def _note(spec: SimulationSpec, trial: HandlingTrial, interface: Kind | None) -> str:
+def _note(spec: SimulationTable, trial: HandlingTrial, interface: Kind | None) -> str:
     """What is used, and a warning with figures where it is not to be trusted."""
     best = trial.best
     if best is None:

@@ -13,21 +13,8 @@ from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.inspection import Inspection, inspect
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario.schema import CommonTable
-from thsa_cosim.search.strategies import SearchMethod, Strategy
+from thsa_cosim.scenario.schema import CommonTable, LawTable, SearchTable, SimulationTable
 from thsa_cosim.signals import Signals
-
-
-@dataclass(frozen=True)
-class LawSpec:
-    """The law over temperature that is wanted for a parameter; ``form`` None: the best by AICc.
-
-    ``published`` are coefficients of ``published_form`` to compare with, in the parameter's unit.
-    """
-
-    form: str | None = None
-    published: tuple[float, ...] | None = None
-    published_form: str | None = None
 
 
 @dataclass(frozen=True)
@@ -115,35 +102,6 @@ class DiagnoseSpec:
     """Of an FMU without source: ``model`` is None then."""
 
 
-@dataclass(frozen=True)
-class SearchSpec:
-    """How parameters are searched; ``profile`` names those of which a profile likelihood is computed."""
-
-    method: SearchMethod = "local-first"
-    population: int = 45
-    generations: int = 30
-    mutation: float = 0.16
-    crossover: float = 0.5
-    strategy: Strategy = "rand1bin"
-    tolerance: float = 1e-3
-    polish: bool = True
-    profile: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class SimulationSpec:
-    """How the FMU is run: communication ``step`` [s] (None: the samples), ``deadline`` [s], ``memory_mb``."""
-
-    interface: Literal["co-simulation", "model-exchange"] | None = None
-    inputs: Literal["hold", "mean", "derivative", "intermediate"] | None = None
-    tolerance: float | None = None
-    step: float | None = None
-    stepping: Literal["free", "samples"] = "free"
-    deadline: float = 60.0
-    memory_mb: float | None = None
-    reuse: Literal["fresh", "reset"] = "fresh"
-
-
 @dataclass(frozen=True, eq=False)
 class TemperaturePoint:
     """Recordings that are identified together, with one set of parameters.
@@ -188,10 +146,10 @@ class Scenario:
     outputs: tuple[str, ...]
     fixed: Mapping[str, float]
     parameters: ParameterSpace
-    laws: Mapping[str, LawSpec]
+    laws: Mapping[str, LawTable]
     cost: CostSpec
-    search: SearchSpec
-    simulation: SimulationSpec
+    search: SearchTable
+    simulation: SimulationTable
     round_to: float = 1.0
     zeroed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """FMU parameters that are 0 because of a parameter's ``zero`` or ``law_block``, by its name."""

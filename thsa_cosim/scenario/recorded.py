@@ -16,14 +16,19 @@ from thsa_cosim.scenario.files import expand, named
 from thsa_cosim.scenario.model import (
     Channel,
     CostSpec,
-    LawSpec,
     Scenario,
-    SearchSpec,
-    SimulationSpec,
     TemperaturePoint,
 )
 from thsa_cosim.scenario.recording_schema import TemperatureTable
-from thsa_cosim.scenario.schema import KINDS, CommonTable, DiagnoseTable, IdentifyTable, SimulateTable
+from thsa_cosim.scenario.schema import (
+    KINDS,
+    CommonTable,
+    DiagnoseTable,
+    IdentifyTable,
+    LawTable,
+    SearchTable,
+    SimulateTable,
+)
 from thsa_cosim.scenario.sentences import from_validation, one_line
 from thsa_cosim.scenario.source import Source, about_kind, read_source
 from thsa_cosim.scenario.system import open_model
@@ -126,7 +131,7 @@ def _resolve(
         laws=_laws(table),
         cost=cost,
         search=_search(table, space),
-        simulation=_simulation(table),
+        simulation=table.simulation,
         round_to=table.temperature.round_to if table.temperature else 1.0,
         zeroed=check.zeroed(table, description),
         force=check.force(table, description, measured) if isinstance(table, IdentifyTable) else None,
@@ -205,18 +210,10 @@ def _points(
     return tuple(points)
 
 
-def _laws(table: CommonTable) -> dict[str, LawSpec]:
+def _laws(table: CommonTable) -> dict[str, LawTable]:
     if not isinstance(table, IdentifyTable):
         return {}
-    return {
-        p.name: LawSpec(
-            p.law.form,
-            tuple(p.law.published) if p.law.published is not None else None,
-            p.law.published_form or p.law.form,
-        )
-        for p in table.parameters
-        if p.law is not None
-    }
+    return {p.name: p.law for p in table.parameters if p.law is not None}
 
 
 def _cost(table: CommonTable, measured: Sequence[str], inputs: Sequence[str]) -> CostSpec:
@@ -239,19 +236,13 @@ def _cost(table: CommonTable, measured: Sequence[str], inputs: Sequence[str]) ->
     return CostSpec(cost.error, channels, cost.window.start, cost.window.stop, mask, tuple(cost.also))
 
 
-def _search(table: CommonTable, space: ParameterSpace) -> SearchSpec:
+def _search(table: CommonTable, space: ParameterSpace) -> SearchTable:
     if not isinstance(table, IdentifyTable):
-        return SearchSpec()
+        return SearchTable()
     for name in table.search.profile:
         if name not in space.names:
             raise ScenarioError(
                 f"search.profile names {name!r}, which is no parameter of [[parameters]]."
                 f"{did_you_mean(name, space.names)}"
             )
-    values = table.search.model_dump()
-    return SearchSpec(**{**values, "profile": tuple(values["profile"])})
-
-
-def _simulation(table: CommonTable) -> SimulationSpec:
-    values = table.simulation.model_dump()
-    return SimulationSpec(memory_mb=values.pop("memory"), **values)
+    return table.search

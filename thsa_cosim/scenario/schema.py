@@ -30,6 +30,11 @@ class LawTable(Table):
     published_form: str | None = None
     """Its form, if it is not ``form``."""
 
+    @property
+    def compared_form(self) -> str | None:
+        """Form of the published curve."""
+        return self.published_form or self.form
+
     @field_validator("form", "published_form")
     @classmethod
     def _form(cls, form: str | None) -> str | None:
@@ -44,7 +49,7 @@ class LawTable(Table):
 
     @model_validator(mode="after")
     def _coefficients(self) -> "LawTable":
-        form = self.published_form or self.form
+        form = self.compared_form
         if self.published is None:
             return self
         if form is None or form == "spline":

@@ -2,11 +2,11 @@
 
 from thsa_cosim.errors import ScenarioError, did_you_mean
 from thsa_cosim.parameters import ParameterSpace
-from thsa_cosim.scenario.tune_model import LOOP_METRICS, TERMS, LineSpec, ParetoSpec, SurfaceSpec
-from thsa_cosim.scenario.tune_schema import TuneTable
+from thsa_cosim.scenario.tune_model import LOOP_METRICS, TERMS
+from thsa_cosim.scenario.tune_schema import LineTable, ParetoTable, SurfaceTable, TuneTable
 
 
-def pareto_spec(table: TuneTable) -> ParetoSpec | None:
+def checked_pareto(table: TuneTable) -> ParetoTable | None:
     """Return ``[pareto]``; ScenarioError for a term that there is not."""
     if table.pareto is None:
         return None
@@ -18,20 +18,20 @@ def pareto_spec(table: TuneTable) -> ParetoSpec | None:
             raise ScenarioError("pareto: effort needs metrics.effort, the signal that counts.")
         if side in LOOP_METRICS and table.loop is None:
             raise ScenarioError(f"pareto: {side} needs the table [loop].")
-    return ParetoSpec(table.pareto.x, table.pareto.y)
+    return table.pareto
 
 
-def line_spec(table: TuneTable, space: ParameterSpace) -> LineSpec | None:
+def checked_line(table: TuneTable, space: ParameterSpace) -> LineTable | None:
     """Return ``[line]``; ScenarioError for an unknown parameter."""
     if table.line is None:
         return None
     for name in (table.line.numerator, table.line.denominator):
         if name not in space.names:
             raise ScenarioError(f"line: {name!r} is no parameter.{did_you_mean(name, space.names)}")
-    return LineSpec(**table.line.model_dump())
+    return table.line
 
 
-def surface_spec(table: TuneTable, space: ParameterSpace) -> SurfaceSpec | None:
+def checked_surface(table: TuneTable, space: ParameterSpace) -> SurfaceTable | None:
     """Return ``[surface]``; ScenarioError for parameters that span no plane."""
     if table.surface is None:
         return None
@@ -43,4 +43,4 @@ def surface_spec(table: TuneTable, space: ParameterSpace) -> SurfaceSpec | None:
     a, b = table.surface.parameters
     if a == b:
         raise ScenarioError("surface.parameters needs two different parameters.")
-    return SurfaceSpec((a, b), table.surface.points)
+    return table.surface

@@ -11,12 +11,11 @@ from thsa_cosim.errors import InputError, MissingExtraError, ScenarioError, Unit
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.scenario import check
-from thsa_cosim.scenario.model import SearchSpec, SimulationSpec
-from thsa_cosim.scenario.schema import KINDS
+from thsa_cosim.scenario.schema import KINDS, SearchTable
 from thsa_cosim.scenario.sentences import from_validation, one_line
 from thsa_cosim.scenario.source import Source, about_kind, read_source
 from thsa_cosim.scenario.system import open_model
-from thsa_cosim.scenario.tune_drawn import line_spec, pareto_spec, surface_spec
+from thsa_cosim.scenario.tune_drawn import checked_line, checked_pareto, checked_surface
 from thsa_cosim.scenario.tune_model import (
     LOOP_METRICS,
     METRICS,
@@ -24,7 +23,6 @@ from thsa_cosim.scenario.tune_model import (
     CommandSpec,
     ControlCostSpec,
     LoopSpec,
-    MetricsSpec,
     Requirement,
     ScheduleSpec,
     TuneScenario,
@@ -88,10 +86,11 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         **{f"compare.{n}": v for n, v in table.compare.items()},
     }.items():
         _all_gains(key, values, space)
+    if table.simulation.step is not None:
+        raise ScenarioError("simulation.step has no meaning here; the command has its own step.")
     if table.metrics.effort is not None:
         check.readable(fmu, table.metrics.effort, "metrics.effort")
-    window = (float(table.metrics.window[0]), float(table.metrics.window[1]))
-    if window[0] > command.time[-1]:
+    if table.metrics.window[0] > command.time[-1]:
         raise ScenarioError("metrics.window begins after command.stop; move one of them.")
     if table.robust.combine == "worst" and any(axis.weights for axis in table.conditions.values()):
         raise ScenarioError("conditions: weights go with robust.combine = 'sum'; remove them or set it.")
@@ -108,26 +107,18 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         parameters=space,
         before=dict(table.before),
         compare={name: dict(values) for name, values in table.compare.items()},
-        metrics=MetricsSpec(
-            table.metrics.rise,
-            table.metrics.fraction,
-            table.metrics.low,
-            table.metrics.high,
-            window,
-            table.metrics.settling_band,
-            table.metrics.effort,
-        ),
+        metrics=table.metrics,
         cost=_cost(table, command, fmu),
         requirements=requirements,
         loop=_loop(table, command, fmu, space),
         combine=table.robust.combine,
         uncertainty=read_uncertainty(path, table, axes, fmu),
         schedule=_schedule(table, axes, fmu),
-        pareto=pareto_spec(table),
-        line=line_spec(table, space),
-        surface=surface_spec(table, space),
-        search=SearchSpec(method="differential-evolution", **table.search.model_dump(), polish=False),
-        simulation=_simulation(table),
+        pareto=checked_pareto(table),
+        line=checked_line(table, space),
+        surface=checked_surface(table, space),
+        search=SearchTable(method="differential-evolution", **table.search.model_dump(), polish=False),
+        simulation=table.simulation,
     )
 
 
@@ -312,10 +303,3 @@ def _schedule(table: TuneTable, axes: Sequence[Axis], fmu: FmuDescription) -> Sc
     return ScheduleSpec(
         tuple(spec.over), spec.smoothing, spec.reserve, tuple(swept.get(a.name, a) for a in axes)
     )
-
-
-def _simulation(table: TuneTable) -> SimulationSpec:
-    values = table.simulation.model_dump()
-    if values["step"] is not None:
-        raise ScenarioError("simulation.step has no meaning here; the command has its own step.")
-    return SimulationSpec(memory_mb=values.pop("memory"), **values)

@@ -8,8 +8,8 @@ from typing import Literal
 
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.parameters import ParameterSpace
-from thsa_cosim.scenario.model import SearchSpec, SimulationSpec
-from thsa_cosim.scenario.tune_schema import TuneTable
+from thsa_cosim.scenario.schema import SearchTable, SimulationTable
+from thsa_cosim.scenario.tune_schema import LineTable, MetricsTable, ParetoTable, SurfaceTable, TuneTable
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import convert
 
@@ -92,19 +92,6 @@ def combinations(axes: Sequence[Axis]) -> tuple[Condition, ...]:
         values = {a.name: a.to_fmu(shown[a.name]) for a in axes if not a.is_input}
         conditions.append(Condition(shown, inputs, values, weight))
     return tuple(conditions)
-
-
-@dataclass(frozen=True)
-class MetricsSpec:
-    """How a response is read: rise time, window of e_ss [s], settling band, the signal of the effort."""
-
-    rise: Literal["first-reach", "between"]
-    fraction: float
-    low: float
-    high: float
-    window: tuple[float, float]
-    settling_band: float
-    effort: str | None
 
 
 @dataclass(frozen=True)
@@ -192,32 +179,6 @@ class ScheduleSpec:
     check: tuple[Axis, ...]
 
 
-@dataclass(frozen=True)
-class ParetoSpec:
-    """Two terms to be small at once."""
-
-    x: str
-    y: str
-
-
-@dataclass(frozen=True)
-class LineSpec:
-    """The ratio of two parameters over the last generations, and a published one."""
-
-    numerator: str
-    denominator: str
-    generations: int
-    published: float | None
-
-
-@dataclass(frozen=True)
-class SurfaceSpec:
-    """The plane of two parameters over which the cost is drawn."""
-
-    parameters: tuple[str, str]
-    points: int
-
-
 @dataclass(frozen=True, eq=False)
 class TuneScenario:
     """What to tune, and for what.
@@ -238,16 +199,16 @@ class TuneScenario:
     parameters: ParameterSpace
     before: Mapping[str, float]
     compare: Mapping[str, Mapping[str, float]]
-    metrics: MetricsSpec
+    metrics: MetricsTable
     cost: ControlCostSpec
     requirements: tuple[Requirement, ...]
     loop: LoopSpec | None
     combine: Literal["worst", "sum"]
     uncertainty: UncertaintySpec | None
     schedule: ScheduleSpec | None
-    pareto: ParetoSpec | None
-    line: LineSpec | None
-    surface: SurfaceSpec | None
-    search: SearchSpec
-    simulation: SimulationSpec
+    pareto: ParetoTable | None
+    line: LineTable | None
+    surface: SurfaceTable | None
+    search: SearchTable
+    simulation: SimulationTable
     kind: str = "tune"

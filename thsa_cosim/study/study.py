@@ -1,13 +1,12 @@
 """A study that runs: its place, claimed for what was asked, and the log of its runs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from thsa_cosim.batch import Experiment, Runner
-from thsa_cosim.scenario import SimulationSpec
+from thsa_cosim.scenario import SimulationTable
 from thsa_cosim.study.folder import claim_folder
 from thsa_cosim.study.identity import Identity
 from thsa_cosim.study.place import Place
@@ -47,10 +46,10 @@ class Study:
         """Runs that were taken from the log so far."""
         return self._log.recalled
 
-    def open_runner(self, spec: SimulationSpec, experiments: Sequence[Experiment]) -> Runner:
+    def open_runner(self, spec: SimulationTable, experiments: Sequence[Experiment]) -> Runner:
         """Open the processes for ``experiments``; their outcomes are kept, and looked up."""
         # Deadline and memory decide whether a run is let finish, not what it gives.
-        settings = replace(spec, deadline=0.0, memory_mb=None)
+        settings = sorted(spec.model_dump(exclude={"deadline", "memory"}).items())
         return LoggedRunner(
             self.place.executor.open_runner(spec, experiments), self._log, experiments, settings
         )

@@ -166,7 +166,7 @@ def reducer(
         scale=scenario.cost.scale,
         fraction=metrics.high if metrics.rise == "between" else metrics.fraction,
         low=metrics.low if metrics.rise == "between" else None,
-        window=metrics.window,
+        window=(metrics.window[0], metrics.window[1]),
         settling_band=metrics.settling_band,
         loop=None
         if loop is None

@@ -197,7 +197,7 @@ class _Tuning:
         eq7 = self._eq7_of_worst(reply.worst)
         feasible = reply.costs < INFEASIBLE
         return Surface(
-            names=spec.parameters,
+            names=(spec.parameters[0], spec.parameters[1]),
             x=values[: spec.points, i],
             y=values[:: spec.points, j],
             cost=np.where(feasible, reply.costs, np.nan).reshape(shape),
@@ -309,7 +309,11 @@ class _Tuning:
             evaluations=0 if evaluator is None else evaluator.evaluations,
             failures={} if evaluator is None else evaluator.failures,
             notes=tuple(self.notes),
-            settings={**asdict(scenario.search), "cost": asdict(scenario.cost), "combine": scenario.combine},
+            settings={
+                **scenario.search.model_dump(),
+                "cost": asdict(scenario.cost),
+                "combine": scenario.combine,
+            },
         )
 
     def _group(self, k: int) -> GroupResult:

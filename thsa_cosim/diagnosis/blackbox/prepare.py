@@ -14,7 +14,7 @@ from thsa_cosim.diagnosis.catalogue.effect import Effect
 from thsa_cosim.errors import StudyError
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.identify.problem import Case
-from thsa_cosim.scenario import BlackBoxSpec, Executor, Scenario, SimulationSpec
+from thsa_cosim.scenario import BlackBoxSpec, Executor, Scenario, SimulationTable
 from thsa_cosim.signals import FloatArray, Signals
 
 #: The step of the load that shows what a load costs, in the largest load of the recordings.
@@ -89,7 +89,7 @@ def _outputs(spec: BlackBoxSpec) -> tuple[str, ...]:
 
 
 def _simulate(
-    fmu: FmuDescription, cases: Sequence[Case], outputs: tuple[str, ...], simulation: SimulationSpec
+    fmu: FmuDescription, cases: Sequence[Case], outputs: tuple[str, ...], simulation: SimulationTable
 ) -> dict[str, Signals]:
     """The outputs of every case that can be simulated, by name; StudyError if none can."""
     experiments: list[Experiment] = [replace(c.experiment(c.name, None), outputs=outputs) for c in cases]
@@ -108,7 +108,7 @@ def _simulate(
 
 
 def _measured(
-    spec: BlackBoxSpec, fmu: FmuDescription, case: Case, base: Signals, simulation: SimulationSpec
+    spec: BlackBoxSpec, fmu: FmuDescription, case: Case, base: Signals, simulation: SimulationTable
 ) -> Drive:
     step, stepped = 0.0, None
     if spec.load is not None:

@@ -19,7 +19,7 @@ from thsa_cosim.export import export_fmu
 from thsa_cosim.export.compile import this_platform
 from thsa_cosim.fmu import read_description
 from thsa_cosim.identify.problem import Case
-from thsa_cosim.scenario import Executor, Scenario, SimulationSpec
+from thsa_cosim.scenario import Executor, Scenario, SimulationTable
 from thsa_cosim.signals import Signals
 from thsa_cosim.study import export_digest, is_made_from, note_made_from
 
@@ -72,7 +72,7 @@ def build_superset(
 
 
 def scales_of(
-    fmu: Path, slots: Sequence[Slot], cases: Sequence[Case], simulation: SimulationSpec
+    fmu: Path, slots: Sequence[Slot], cases: Sequence[Case], simulation: SimulationTable
 ) -> dict[str, dict[str, float]]:
     """How large speed, position, load … are in each slot over the recordings, in the slot's units.
 
@@ -121,7 +121,7 @@ def slot_signals(
     slots: Sequence[Slot],
     cases: Sequence[Case],
     values: Mapping[str, Mapping[str, float]],
-    simulation: SimulationSpec,
+    simulation: SimulationTable,
 ) -> dict[str, Signals]:
     """Inputs of every friction slot over each recording, by case name, at the given start values per case."""
     outputs = tuple(

@@ -11,7 +11,7 @@ from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
 from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.errors import StudyError
-from thsa_cosim.scenario import OpenRunner, SimulationSpec
+from thsa_cosim.scenario import OpenRunner, SimulationTable
 from thsa_cosim.signals import FloatArray, Signals
 
 
@@ -33,7 +33,7 @@ def identify_model(
     trials: tuple[Trial, ...],
     unknowns: Unknowns,
     starts: Sequence[FloatArray],
-    simulation: SimulationSpec,
+    simulation: SimulationTable,
     open_runner: OpenRunner,
 ) -> Identified:
     """Identify ``unknowns`` of an FMU on the fit recordings from every one of ``starts``; the best fit counts.

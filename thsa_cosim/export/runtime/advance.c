@@ -41,7 +41,7 @@ static int judge(const Instance *c, const double *g, Check *out) {
     double finite = 0.0;
     out->worst = -DBL_MAX;
     for (int k = 0; k < N_G; k++) {
-        const double away = (c->s.now.m[k] > 0.5 ? -g[k] : g[k]) - instance_dead_band(c, k);
+        const double away = (1.0 - 2.0 * c->s.now.m[k]) * g[k] - (1e-13 * c->s.now.span[k] + DBL_MIN);
         out->disagreement[k] = away;
         if (away > out->worst) out->worst = away;
         finite += g[k] - g[k];

@@ -72,7 +72,7 @@ struct Instance {
     double factored_step;
     double J[2][N_X * N_X + 1], B[N_X * N_U + 1], ft[N_X + 1];
     double lu[N_X * N_X + 1];
-    int pivot[N_X + 1];
+    int pivot[N_X + 1], order[N_X + 1];
     double entry[N_X * N_X + 1]; /* of lu beside the diagonal, without zeros: solver.c, compress */
     int row[N_X * N_X + 1], lower[N_X + 1], upper[N_X + 1];
     double stage[RODAS_STAGES][N_X + 1];

@@ -88,9 +88,15 @@ static int factorize(double *restrict w, int *restrict pivot) {
     return 0;
 }
 
-/* The factors' entries that are not 0, column by column: first those of L, then those of U. */
+/* The factors' entries that are not 0, column by column: first those of L, then those of U; the swaps as one order. */
 static void compress(Instance *c) {
     int n = 0;
+    for (int k = 0; k < N_X; k++) c->order[k] = k;
+    for (int k = 0; k < N_X; k++) {
+        const int swap = c->order[k];
+        c->order[k] = c->order[c->pivot[k]];
+        c->order[c->pivot[k]] = swap;
+    }
     for (int k = 0; k < N_X; k++) {
         const double *col = c->lu + k * N_X;
         c->lower[k] = n;
@@ -104,19 +110,17 @@ static void compress(Instance *c) {
 }
 
 static void solve(const Instance *c, double *restrict b) {
+    double v[N_X];
+    for (int k = 0; k < N_X; k++) v[k] = b[c->order[k]];
     for (int k = 0; k < N_X; k++) {
-        const double swap = b[k];
-        b[k] = b[c->pivot[k]];
-        b[c->pivot[k]] = swap;
-    }
-    for (int k = 0; k < N_X; k++) {
-        const double v = b[k];
-        for (int e = c->lower[k]; e < c->upper[k]; e++) b[c->row[e]] -= v * c->entry[e];
+        const double known = v[k];
+        for (int e = c->lower[k]; e < c->upper[k]; e++) v[c->row[e]] -= known * c->entry[e];
     }
     for (int k = N_X - 1; k >= 0; k--) {
-        const double v = b[k] *= c->lu[k * (N_X + 1)];
-        for (int e = c->upper[k]; e < c->lower[k + 1]; e++) b[c->row[e]] -= v * c->entry[e];
+        const double known = v[k] *= c->lu[k * (N_X + 1)];
+        for (int e = c->upper[k]; e < c->lower[k + 1]; e++) v[c->row[e]] -= known * c->entry[e];
     }
+    for (int k = 0; k < N_X; k++) b[k] = v[k];
 }
 
 /* By value: terms whose coefficient is 0 may change from 0.0 to -0.0, which is no reason to factorize anew. */

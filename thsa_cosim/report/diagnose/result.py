@@ -2,11 +2,9 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
-
-import pandas as pd
 
 from thsa_cosim.diagnosis.results import (
     ChannelError,
@@ -18,7 +16,7 @@ from thsa_cosim.diagnosis.results import (
 )
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.inspection import judge_ratios
-from thsa_cosim.report.files import RESULT, write_json
+from thsa_cosim.report.files import RESULT, write_csv, write_json
 from thsa_cosim.report.page.pictures import write_pictures
 from thsa_cosim.report.signal_files import write_signals
 
@@ -116,18 +114,16 @@ def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:
     """Write result.json, candidates.csv, structure.csv, experiment.csv and the signals; the paths."""
     content = diagnosis_json(result, folder)
     files = []
-    table = pd.DataFrame(
-        [
-            {**{k: v for k, v in c.items() if k != "parameters"}, "parameters": json.dumps(c["parameters"])}
-            for c in content["candidates"]
-        ]
-    )
-    table.to_csv(folder / "candidates.csv", index=False)
-    files.append(folder / "candidates.csv")
-    pd.DataFrame([vars(d) for d in result.dependence]).to_csv(folder / "structure.csv", index=False)
-    files.append(folder / "structure.csv")
+    weighed = [{**c, "parameters": json.dumps(c["parameters"])} for c in content["candidates"]]
+    tables = {"candidates.csv": weighed, "structure.csv": [vars(d) for d in result.dependence]}
+    for name, rows in tables.items():
+        write_csv(folder / name, list(rows[0]) if rows else [], [_cells(list(row.values())) for row in rows])
+        files.append(folder / name)
     if result.experiment is not None:
-        result.experiment.inputs.to_frame().to_csv(folder / "experiment.csv")
+        inputs = result.experiment.inputs
+        header = ["time [s]", *(f"{n} [{inputs.units[n]}]" for n in inputs.names)]
+        samples = zip(inputs.time.tolist(), *(inputs[n].tolist() for n in inputs.names), strict=True)
+        write_csv(folder / "experiment.csv", header, [_cells(sample) for sample in samples])
         files.append(folder / "experiment.csv")
     for c in result.comparisons:
         models = {"before": c.before, "after": c.after}
@@ -154,6 +150,12 @@ def _law(law: EmpiricalLaw) -> dict[str, Any]:
         "held_out_gain": law.held_out_gain,
         "added": law.added,
     }
+
+
+def _cells(values: Collection[Any]) -> list[str]:
+    """A row of a CSV file: numbers that read back as they are, nothing for what is missing."""
+    shown = ["" if v is None else repr(float(v)) if isinstance(v, float) else str(v) for v in values]
+    return ["" if text == "nan" else text for text in shown]
 
 
 def _evidence(found: Evidence) -> dict[str, Any]:

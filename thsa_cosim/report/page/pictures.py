@@ -1,5 +1,7 @@
 """The pictures of a study: what its page draws, as PNG files and for notebooks."""
 
+import importlib.util
+import logging
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +13,7 @@ from thsa_cosim.report.parts.content import Figure
 from thsa_cosim.report.signal_files import file_name
 
 FOLDER = "plots"
+_log = logging.getLogger(__name__)
 _GROUP = re.compile(r"(?<=^fit)-|(?<=^validate)-|(?<=^response)-|(?<=^law)-|(?<=^friction)-|(?<=^schedule)-")
 """Between the group that a figure belongs to and its own name."""
 
@@ -24,7 +27,12 @@ def pictures(folder: Path) -> Mapping[str, Figure]:
 
 
 def write_pictures(folder: Path) -> list[Path]:
-    """Write every figure of the study as ``plots/<name>.png``; return the paths."""
+    """Write every figure of the study as ``plots/<name>.png``; return the paths, none without matplotlib."""
+    if importlib.util.find_spec("matplotlib") is None:
+        _log.warning(
+            "No PNG files without matplotlib: pip install 'thsa-cosim[notebook]'; the page has every plot."
+        )
+        return []
     # matplotlib takes half a second to import: not before the study has run.
     from thsa_cosim.report.parts.drawing import save
 

@@ -26,7 +26,8 @@ def plus_minus(value: float | None, stderr: float | None) -> str:
     shift = exponent if not -3 <= exponent < 5 else 0
     scaled, error = value / 10.0**shift, stderr / 10.0**shift
     decimals = min(max(1 - math.floor(math.log10(error)), 0), 9)
-    text = f"{scaled:.{decimals}f} ± {error:.{decimals}f}"
+    rounded = round(scaled, decimals) + 0.0  # no −0
+    text = f"{rounded:.{decimals}f} ± {error:.{decimals}f}"
     return text if shift == 0 else f"({text})e{shift}"
 
 

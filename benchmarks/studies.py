@@ -1,0 +1,256 @@
+"""What a whole study costs, where it goes, and what the strongest script of a user costs beside it.
+
+    python benchmarks/studies.py [SCENARIO ...] [--script-points 8] [--output DIR]
+
+Each scenario runs from the import to the page, in a process of its own with one worker, as its command does. Printed
+per study, in CPU seconds: all of it; import; the parent (search, linear algebra, journal); workers; the report
+(tables, pictures, page); export; and the bare FMU: as many simulations as the study had, each as long as one
+takes alone in a compiled process. ``total/FMU`` is the first over the last. Of motor, screw and gearbox,
+`script_least_squares.py` then identifies the first ``--script-points`` temperatures from the same arrays;
+``script/ours`` compares CPU seconds per temperature, ours with everything included, and ``cost`` says by how
+much the script's final cost lies above ours.
+"""
+
+import argparse
+import json
+import pickle
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+# The benchmark next door is called coverage.py, and numba imports a package of that name.
+sys.path[:] = [entry for entry in sys.path if Path(entry or ".").resolve() != HERE]
+
+SCENARIOS = HERE.parent / "scenarios"
+#: Command of every shipped scenario that runs on shipped recordings.
+COMMANDS = {
+    "motor": "identify",
+    "screw": "identify",
+    "gearbox": "identify",
+    "table4": "tune",
+    "driven": "diagnose",
+    "actuator": "identify",
+    "feedforward": "tune",
+    "schedule": "tune",
+}
+#: What counts as report, and as export: functions by the room they are in.
+REPORT = (
+    ("thsa_cosim.report.identify.files", "write_identify"),
+    ("thsa_cosim.report.tune.files", "write_tune"),
+    ("thsa_cosim.report.diagnose.result", "write_diagnosis"),
+    ("thsa_cosim.report.page.write", "write_page"),
+)
+EXPORT = (("thsa_cosim.export", "export_fmu"),)
+
+
+def one(name: str, folder: Path) -> dict[str, Any]:
+    """Run one study in this process and say where its CPU seconds went."""
+    from thsa_cosim.cli import run_command
+
+    spent = {"report": 0.0, "export": 0.0}
+    imported = time.process_time()
+    import thsa_cosim.export
+    import thsa_cosim.identify
+    import thsa_cosim.scenario  # noqa: F401
+
+    imported = time.process_time() - imported
+    for part, places in (("report", REPORT), ("export", EXPORT)):
+        for module, function in places:
+            _clocked(module, function, part, spent)
+    code = run_command(
+        [COMMANDS[name], str(SCENARIOS / f"{name}.toml"), "-o", str(folder), "--workers", "1", "--quiet"]
+    )
+    own, children = (resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    whole, workers = own.ru_utime + own.ru_stime, children.ru_utime + children.ru_stime
+    parent = whole - imported - spent["report"] - spent["export"]
+    return {"code": code, "import": imported, "parent": parent, "workers": workers, **spent}
+
+
+def _clocked(module: str, function: str, part: str, spent: dict[str, float]) -> None:
+    """Let a function add its CPU seconds to ``spent``; one that a kind does not have is left out."""
+    import importlib
+
+    try:
+        room = importlib.import_module(module)
+        inner: Callable[..., Any] = getattr(room, function)
+    except (ImportError, AttributeError):
+        return
+
+    def clocked(*arguments: Any, **named: Any) -> Any:
+        begin = time.process_time()
+        try:
+            return inner(*arguments, **named)
+        finally:
+            spent[part] += time.process_time() - begin
+
+    setattr(room, function, clocked)
+
+
+def bare(name: str) -> float:
+    """CPU seconds of one simulation of the scenario alone, the mean over its cases."""
+    from thsa_cosim.fmu.archive import unpack
+    from thsa_cosim.fmu.plant import Plant
+
+    spent = []
+    for fmu, experiments, values in _experiments(name):
+        with tempfile.TemporaryDirectory() as folder:
+            unpack(fmu.path, Path(folder))
+            plant = Plant(fmu, Path(folder))
+            for experiment in experiments:
+                start = {**experiment.fixed, **values}
+                drive = (experiment.inputs, experiment.outputs, experiment.time)
+                plant.run(start, *drive, tolerance=experiment.tolerance)
+                begin = time.process_time()
+                for _ in range(5):
+                    plant.run(start, *drive, tolerance=experiment.tolerance)
+                spent.append((time.process_time() - begin) / 5.0)
+            plant.close()
+    return sum(spent) / len(spent)
+
+
+def _experiments(name: str) -> Any:
+    if COMMANDS[name] == "tune":
+        from thsa_cosim.scenario import load_tune
+        from thsa_cosim.tune.problem import build_groups
+
+        tuned = load_tune(SCENARIOS / f"{name}.toml")
+        middle = tuned.parameters.assignments(tuned.before)
+        yield tuned.fmu, [case.experiment for case in build_groups(tuned)[0].cases], middle
+        return
+    for scenario, points in _points(name):
+        for point in points:
+            values = point.space.assignments(point.space.decode(_middle(point.space.dimension)))
+            yield scenario.fmu, [case.experiment("bare", None) for case in point.cases], values
+
+
+def _middle(dimension: int) -> Any:
+    import numpy as np
+
+    return np.full(dimension, 0.5)
+
+
+def _points(name: str) -> Any:
+    from thsa_cosim.identify.problem import build_point
+    from thsa_cosim.scenario import StagedScenario, load
+
+    study = load(SCENARIOS / f"{name}.toml")
+    parts = [s.scenario for s in study.stages] if isinstance(study, StagedScenario) else [study]
+    for scenario in parts:
+        yield scenario, [build_point(scenario, p) for p in scenario.points]
+
+
+def task(name: str, count: int) -> list[dict[str, Any]]:
+    """The first points of a scenario as plain arrays for the script."""
+    import numpy as np
+
+    found = []
+    for _, points in _points(name):
+        for point in points[:count]:
+            space = point.space.parameters
+            cases = []
+            for case in point.cases:
+                inputs = {n: case.inputs.resample(case.time)[n] for n in case.inputs.names}
+                channels = {
+                    c.name: (
+                        np.searchsorted(case.time, c.time - 1e-9),
+                        c.measured,
+                        c.noise / np.sqrt(c.weight),
+                    )
+                    for c in case.channels
+                }
+                cases.append(
+                    {
+                        "fmu": str(case.fmu),
+                        "fixed": dict(case.fixed),
+                        "time": case.time,
+                        "inputs": inputs,
+                        "held": sorted(case.inputs.held),
+                        "channels": channels,
+                        "tolerance": case.tolerance,
+                    }
+                )
+            found.append(
+                {
+                    "label": point.label,
+                    "cases": cases,
+                    "variables": [p.variable for p in space],
+                    "lower": [p.lower for p in space],
+                    "upper": [p.upper for p in space],
+                    "log": [p.scale == "log" for p in space],
+                    "factor": [p.to_variable(1.0) - p.to_variable(0.0) for p in space],
+                    "offset": [p.to_variable(0.0) for p in space],
+                }
+            )
+    return found
+
+
+def measure(name: str, output: Path, script_points: int) -> None:
+    """Print one line of the table, and the comparison with the script where there is one."""
+    folder = output / name
+    begin = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, __file__, "--one", name, "--output", str(folder)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    wall = time.perf_counter() - begin
+    if done.returncode or not done.stdout:
+        print(f"{name}: {done.stderr.strip().splitlines()[-1:]}")
+        return
+    spent = json.loads(done.stdout.splitlines()[-1])
+    result = json.loads((folder / "result.json").read_text())
+    runs, each = result["evaluations"], bare(name)
+    total = sum(spent[k] for k in ("import", "parent", "workers", "report", "export"))
+    parts = "  ".join(f"{k} {spent[k]:.1f}" for k in ("import", "parent", "workers", "report", "export"))
+    print(
+        f"{name:12s} {total:6.1f} s CPU, {wall:.0f} s wall, {runs} evaluations:  {parts}"
+        f"  FMU {runs * each:.1f} ({1e3 * each:.2f} ms a run)  total/FMU {total / (runs * each):.2f}"
+    )
+    if name in ("motor", "screw", "gearbox") and script_points:
+        _beside(name, result, total, script_points, output)
+
+
+def _beside(name: str, result: dict[str, Any], total: float, count: int, output: Path) -> None:
+    """The script on the first points of the same scenario, right after ours."""
+    arrays = output / f"{name}.pickle"
+    arrays.write_bytes(pickle.dumps(task(name, count)))
+    script = [sys.executable, str(HERE / "script_least_squares.py"), str(arrays)]
+    found = json.loads(subprocess.run(script, capture_output=True, text=True, check=True).stdout)
+    ours = total / len(result["points"])
+    theirs = found["cpu"] / len(found["points"])
+    costs = {point["label"]: point for point in result["points"]}
+    above = max(p["cost"] / costs[p["label"]]["cost"] - 1.0 for p in found["points"])
+    runs = sum(p["runs"] for p in found["points"])
+    print(
+        f"{'':12s} the script: {theirs:.1f} s CPU a temperature, {runs} runs; ours {ours:.2f} s;"
+        f"  script/ours {theirs / ours:.1f}, cost {above:+.1e} above ours"
+    )
+
+
+def main() -> None:
+    """Parse the command line and measure."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("scenarios", nargs="*", metavar="SCENARIO", help=", ".join(COMMANDS))
+    parser.add_argument("--script-points", type=int, default=8)
+    parser.add_argument("--output", type=Path)
+    parser.add_argument("--one", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        print("\n" + json.dumps(one(options.one, options.output)))
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        for name in options.scenarios or COMMANDS:
+            measure(name, options.output or Path(folder), options.script_points)
+
+
+if __name__ == "__main__":
+    main()

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import thsa_cosim
 from thsa_cosim import cli
 from thsa_cosim import shipped as module
 from thsa_cosim.errors import InputError
@@ -89,3 +90,9 @@ def test_a_diagnosis_finds_the_package_beside_its_scenario_or_the_shipped_one(tm
     spec = load_scenario(alone / "driven.toml").diagnose
     assert spec is not None
     assert spec.package == shipped("modelica", "THSA")
+
+
+def test_one_version_everywhere() -> None:
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert thsa_cosim.__version__ == stated
+    assert f"\nversion: {stated}\n" in (ROOT / "CITATION.cff").read_text()

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from thsa_cosim import cli
+from thsa_cosim.api.forecast import _usual
 from thsa_cosim.batch import Job, Outcome, Status
 
 ROOT = Path(__file__).parents[2]
@@ -117,3 +118,12 @@ def test_failing_runs_are_told_beforehand(
     code, out, _ = run(capsys, "identify", scenario, "-o", tmp_path / "study", "--dry-run")
     assert code == 0
     assert "12 of the timed runs failed: the process died by SIGSEGV" in out
+
+
+def test_one_run_in_many_that_creeps_does_not_decide_the_forecast() -> None:
+    usual = [Outcome(Status.OK, duration_s=0.01)] * 11
+    assert _usual(usual, 0.12, 1) == pytest.approx(0.12 / 11)
+    creeping = [*usual, Outcome(Status.OK, duration_s=6.0)]
+    assert _usual(creeping, 6.13, 1) == pytest.approx((6.13 - (6.0 - 0.05)) / 12)
+    # Two workers: while one creeps, the other has long done its share.
+    assert 0.0 < _usual(creeping, 6.01, 2) < 0.3

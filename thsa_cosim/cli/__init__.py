@@ -2,7 +2,7 @@
 
 ``main``      the group of all commands, errors as one sentence, exit codes
 ``options``   what the study commands share: their options, where a study goes, how it ends
-``models``    export, check
+``export``, ``check``: models, and what can be trusted
 ``dry_run``   what a study command would run, and how long it would take
 ``identify``, ``tune``, ``diagnose``, ``simulate``, ``report``, ``init``, ``demo``, ``completion``: one a command
 

@@ -186,7 +186,7 @@ class _Run:
                 if not self.nx:
                     stop = min(stop, float(times[self.next_row]))
                 before = t
-                if stop - t > slack * 1e-3:
+                if stop - t > slack * 1e-3 and (self.nx or self.nz):
                     t, is_root = solver.step(stop)
                 else:
                     t, is_root = stop, False

@@ -7,6 +7,8 @@ import numpy as np
 from thsa_cosim.inspection.channel import Channel, share
 from thsa_cosim.inspection.finding import Finding, Severity
 
+_DITHERED = 0.7
+"""Noise in steps from which on averages see between the levels."""
 _LEVELS = 100
 """A signal that is met by fewer levels than this over its range is coarse, if no noise dithers them."""
 
@@ -37,11 +39,11 @@ def resolution(channel: Channel) -> Iterator[Finding]:
     if step == 0.0 or channel.averaged or channel.role == "input" or channel.range <= 0.0:
         return
     levels = channel.range / step
-    if not channel.silent or levels > _LEVELS:
+    if channel.noise > _DITHERED * step or levels > _LEVELS:
         return
     text = (
-        f"{channel.name} is resolved to {channel.number(step)}, {levels:.0f} steps over its range, with no noise to"
-        f" dither them"
+        f"{channel.name} is resolved to {channel.number(step)}, {levels:.0f} steps over its range, with too little"
+        f" noise to dither them"
     )
     yield channel.finding("coarse-resolution", "warning", text)
 

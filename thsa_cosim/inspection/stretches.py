@@ -53,9 +53,10 @@ def _piles_up(values: FloatArray, limit: float, channel: Channel) -> bool:
     busiest = np.unique(near, return_counts=True)[1].max() if near.size else 0
     # Neighbours of a clipped sample are clipped, too; of an extreme of noise they are not.
     together = float(np.mean(at[1:][at[:-1]])) if at[:-1].any() else 0.0
-    if count <= _PILE * busiest and not (
-        count > 2.0 * busiest and together > 0.5 and count > 3 * _LEAST_CLIPPED
-    ):
+    longer = count > 2.0 * busiest and together > 0.5 and count > 3 * _LEAST_CLIPPED
+    # Noise about the limit itself: every second sample is clipped.
+    dithered = count > 3.0 * busiest and together > 0.25 and channel.noise > 2.0 * channel.quantum
+    if count <= _PILE * busiest and not longer and not dithered:
         return False
     return channel.steady or _runs_into(values, at, channel.quantum)
 

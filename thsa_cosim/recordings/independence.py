@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from thsa_cosim.signals import FloatArray
 
-_LEAST_MARKS = 12
+_LEAST_MARKS = 30
 """Changes or bends that make a pattern."""
 _LONGEST = 1000
 """Samples; longer periods are not looked for."""

@@ -21,6 +21,8 @@ from thsa_cosim.signals import FloatArray
 _CLIP = 4.0
 _CLIPPED_SHARE = 0.99906  # standard deviation of a unit normal truncated at 4
 _LEAST = 16
+_RESTS = 8
+"""Runs of one value; more of them are a lattice's, or a command's."""
 RESTING = 25
 """Samples of one value in a row that are rest, a held command, or a sensor that is stuck: not noise."""
 
@@ -68,8 +70,10 @@ def _without_rest(values: FloatArray) -> FloatArray:
     usual = (
         float(np.quantile(np.repeat(lengths[short], lengths[short]), 0.9)) if short.any() else float(RESTING)
     )
-    moving = np.repeat(lengths < max(RESTING, 10.0 * usual), lengths)
-    return values[moving] if np.sum(moving) >= max(100, values.size // 20) else values
+    long = lengths >= max(RESTING, 10.0 * usual)
+    moving = np.repeat(~long, lengths)
+    enough = np.sum(moving) >= max(100, values.size // 20)
+    return values[moving] if enough and np.sum(long) <= _RESTS else values
 
 
 def white_noise(values: FloatArray) -> float:

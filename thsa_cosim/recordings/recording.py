@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thsa_cosim.errors import RecordingError, ThsaCosimError, UnitError, did_you_mean, did_you_mean_path
+from thsa_cosim.recordings import foreign
 from thsa_cosim.recordings.axis import (
     TimeAxis,
     check_finite,
@@ -21,7 +22,6 @@ from thsa_cosim.recordings.axis import (
 )
 from thsa_cosim.recordings.noise import noise_estimate
 from thsa_cosim.recordings.outliers import Mask
-from thsa_cosim.recordings.piecewise import fit_piecewise_linear
 from thsa_cosim.recordings.repair import Repair, coded, repaired
 from thsa_cosim.recordings.table import Choose, RawColumn, resolve, sparse_rows
 from thsa_cosim.signals import FloatArray, Signals
@@ -251,6 +251,10 @@ def read_recording(
             measured = measured[~mended.left_out]
         noise[signal] = noise_estimate(measured)
         if source.smooth == "piecewise-linear":
+            from thsa_cosim.recordings.piecewise import (
+                fit_piecewise_linear,
+            )  # its linear algebra takes time to load
+
             fit = fit_piecewise_linear(t[kept], numbers[kept], source.noise or noise[signal])
             if fit.doubt:
                 notes.append(f"{path}: {signal} is used as measured, not piecewise linear: {fit.doubt}.")
@@ -368,10 +372,8 @@ def _load(path: Path, choose: Choose) -> tuple[dict[str, RawColumn], str]:
         raise RecordingError(f"{path}: cannot be read ({reason}).") from None
     if not content:
         raise RecordingError(f"{path}: is empty; record or export it again.")
-    read: Callable[[Path, Choose], dict[str, RawColumn]]
-    read = import_module(f"thsa_cosim.recordings.{SUFFIXES[suffix]}").read
     try:
-        return read(path, choose), hashlib.sha256(content).hexdigest()
+        return _read(SUFFIXES[suffix], path, choose), hashlib.sha256(content).hexdigest()
     except ThsaCosimError:
         raise
     except Exception as error:  # the parsers raise anything on a damaged file
@@ -379,6 +381,14 @@ def _load(path: Path, choose: Choose) -> tuple[dict[str, RawColumn], str]:
         raise RecordingError(
             f"{path}: is no readable {SUFFIXES[suffix]} file ({reason.rstrip('.')}); export it again."
         ) from None
+
+
+def _read(format_: str, path: Path, choose: Choose) -> dict[str, RawColumn]:
+    if format_ in foreign.FORMATS:
+        return foreign.read(format_, path, choose)
+    read: Callable[[Path, Choose], dict[str, RawColumn]]
+    read = import_module(f"thsa_cosim.recordings.{format_}").read
+    return read(path, choose)
 
 
 def _to_unit(

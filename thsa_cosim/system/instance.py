@@ -209,6 +209,8 @@ class SystemInstance(Instance):
     def event_iteration(self) -> EventInfo:
         """Let stepped components act, then iterate events and connections until nothing changes."""
         self._act()
+        if not self._continuous:
+            return EventInfo(False, False, False, False, min(s.next_time for s in self._stepped))
         needs = terminate = nominals = states = False
         following: float | None = None
         for _ in range(_EVENT_ITERATIONS):

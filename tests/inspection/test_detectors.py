@@ -1,0 +1,131 @@
+"""The data check: every kind of defect is named on channels of every bench, and clean recordings have no finding."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from inspection.defects import DEFECTS
+from thsa_cosim.inspection import Finding, inspect_file
+from thsa_cosim.inspection.channel import Channel
+from thsa_cosim.inspection.recording import inspect_channels
+from thsa_cosim.inspection.time_axis import time_findings
+from thsa_cosim.recordings import noise_estimate
+
+RECORDINGS = Path(__file__).parents[2] / "scenarios" / "recordings"
+CHANNELS = {
+    "motor_p25": ("motor_speed_rad_s", "q_current_A", "q_voltage_V"),
+    "screw_m30": ("velocity_mm_s", "force_kN"),
+    "gearbox_p00": ("force_kN",),
+    "driven_m30_b": ("velocity_mm_s", "position_mm", "load_kN"),
+}
+UNITS = {"rad_s": "rad/s", "mm_s": "mm/s", "A": "A", "V": "V", "kN": "kN", "mm": "mm", "degC": "degC"}
+INPUTS = ("command", "load", "temperature")
+
+
+def load(name: str) -> pd.DataFrame:
+    return pd.read_parquet(RECORDINGS / f"{name}.parquet").astype(float)
+
+
+def found(table: pd.DataFrame, inputs: tuple[str, ...] = INPUTS) -> list[Finding]:
+    """Findings above "note"."""
+    time = table["time_s"].to_numpy()
+    channels = [
+        Channel(
+            recording="run",
+            name=name,
+            unit=next(u for ending, u in UNITS.items() if name.endswith(ending)),
+            role="input" if any(word in name for word in inputs) else "output",
+            time=time,
+            values=table[name].to_numpy(),
+            held="command" in name,
+        )
+        for name in table
+        if name != "time_s"
+    ]
+    return [f for f in inspect_channels("run", channels, [time]) if f.severity != "note"]
+
+
+@pytest.mark.parametrize("path", sorted(RECORDINGS.glob("*.parquet")), ids=lambda p: p.stem)
+def test_a_clean_recording_has_no_finding(path: Path) -> None:
+    assert [f for f in inspect_file(path).data.findings if f.severity != "note"] == []
+
+
+def cases() -> list[tuple[str, str, str]]:
+    return [(d, name, channel) for d in DEFECTS for name, own in CHANNELS.items() for channel in own]
+
+
+@pytest.mark.parametrize(("defect", "name", "channel"), cases())
+def test_a_defect_is_named_on_its_channel(defect: str, name: str, channel: str) -> None:
+    table = load(name)
+    time, values = table["time_s"].to_numpy(), table[channel].to_numpy()
+    damage, kinds = DEFECTS[defect]
+    if defect == "hum" and time[1] > 0.005:
+        pytest.skip("sampled too slowly for a mains line")
+    if defect == "dropouts" and np.median(np.abs(values)) < 10.0 * noise_estimate(values):
+        pytest.skip("it is at zero most of the time")
+    if defect == "coarse" and (
+        channel.startswith(("load", "velocity")) or np.ptp(values) < 50 * noise_estimate(values)
+    ):
+        pytest.skip("its noise dithers every lattice of that size, or it is an input")
+    seed = sum(map(ord, defect + name + channel))
+    table[channel] = damage(time, values, np.random.default_rng(seed))
+    if np.unique(table[channel]).size < 5:
+        pytest.skip("two levels: there is no noise to be seen, which loading refuses")
+    inputs = (*INPUTS, "velocity") if name.startswith(("screw", "gearbox")) else INPUTS
+    hits = [f for f in found(table, inputs) if f.channel == channel and f.kind in kinds]
+    assert hits, [(f.channel, f.kind) for f in found(table, inputs)]
+
+
+def stamps(change: str, rng: np.random.Generator) -> np.ndarray:
+    time = np.arange(4000) * 1e-3
+    if change == "jitter":
+        return np.sort(time + rng.uniform(-4e-4, 4e-4, time.size))
+    if change == "gaps":
+        return time[(time < 1.0) | (time > 1.3)]
+    if change == "lost-samples":
+        return time[rng.random(time.size) > 0.3]
+    if change == "several-rates":
+        return np.concatenate((time[:2000], 2.0 + 3e-3 * np.arange(1000)))
+    if change == "repeated-stamps":
+        return np.round(time, 2)
+    assert change == "too-short"
+    return time[:30]
+
+
+@pytest.mark.parametrize(
+    "kind", ["jitter", "gaps", "lost-samples", "several-rates", "repeated-stamps", "too-short"]
+)
+def test_a_time_axis_is_named_for_what_is_wrong_with_it(kind: str) -> None:
+    kinds = {
+        f.kind for f in time_findings("run", stamps(kind, np.random.default_rng(3))) if f.severity != "note"
+    }
+    assert kind in kinds
+    assert kinds <= {kind, *(("gaps",) if kind == "lost-samples" else ())}
+
+
+@pytest.mark.parametrize("start", [0.0, 1.7e9, -5.0])
+def test_a_regular_time_axis_has_no_finding(start: float) -> None:
+    assert list(time_findings("run", start + np.arange(4000) * 1e-3)) == []
+
+
+def test_a_command_that_comes_late_is_named() -> None:
+    table = load("motor_m30")
+    table["speed_command_rad_s"] = table["speed_command_rad_s"].shift(20).fillna(0.0)
+    assert [(f.channel, f.kind) for f in found(table)] == [("speed_command_rad_s", "delay")]
+
+
+@pytest.mark.parametrize(("factor", "kind"), [(30 / np.pi, "unit"), (180 / np.pi, "unit"), (-1.0, "sign")])
+def test_a_speed_that_is_not_its_command_is_named(factor: float, kind: str) -> None:
+    table = load("motor_m30")
+    table["motor_speed_rad_s"] *= factor
+    assert ("motor_speed_rad_s", kind) in [(f.channel, f.kind) for f in found(table)]
+
+
+def test_a_recording_that_begins_in_motion_or_gets_warm_is_named() -> None:
+    table = load("motor_m30")
+    late = table[table["time_s"] > 1.5]
+    assert ("motor_speed_rad_s", "moving-start") in [(f.channel, f.kind) for f in found(late)]
+    table["temperature_degC"] = np.linspace(-30.0, -24.0, len(table))
+    assert [(f.channel, f.kind) for f in found(table)] == [("temperature_degC", "temperature-drift")]

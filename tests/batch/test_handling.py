@@ -1,5 +1,8 @@
 """How inputs reach an FMU: what is right is found by trial, not believed."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 from fmu_sources import build
@@ -68,3 +71,23 @@ def test_a_signal_that_is_zero_but_for_rounding_is_no_alarm() -> None:
     change, worst = largest_change(base, found)
     assert worst == "a"
     assert change == pytest.approx(1e-5 / np.ptp(base["a"]))
+
+
+@pytest.mark.slow
+def test_a_drive_exported_by_dymola() -> None:
+    """Set TUTORIAL_FMUS to a check-out of https://github.com/modelica/fmi-beginners-tutorial-2025."""
+    path = Path(os.environ.get("TUTORIAL_FMUS", "")) / "part2" / "Drive.fmu"
+    if not path.is_file():
+        pytest.skip("TUTORIAL_FMUS names no check-out of the tutorial")
+    time = np.linspace(0.0, 2.0, 2001)
+    inputs = {
+        "V": np.interp(time, [0.0, 0.1, 0.4, 0.9, 1.3, 1.6, 2.0], [0.0, 0.0, 100.0, 100.0, 30.0, 60.0, 60.0]),
+        "LoadTorque_Nm": np.interp(time, [0.0, 1.0, 1.1, 1.7, 2.0], [0.0, 0.0, 2.0, 2.0, 0.0]),
+    }
+    trial = try_input_handling(Experiment("x", path, Signals(time, inputs), ("w",), time))
+    assert trial.reference == "Model Exchange"
+    errors = {way.mode: way.error for way in trial.ways}
+    assert trial.best is not None
+    assert trial.best.mode == "mean"
+    assert errors["mean"] < 1e-4
+    assert errors["derivative"] > 1e-2

@@ -4,12 +4,14 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from thsa_cosim import cli
+from thsa_cosim.cli.options import StudyOptions
 from thsa_cosim.export import export_fmu
 from thsa_cosim.fmu import Plant
 from thsa_cosim.scenario import load_scenario
@@ -138,3 +140,16 @@ def test_it_finds_the_effect_and_writes_a_model_that_predicts_to_the_noise(tmp_p
     value = result["effects"][0]["parameters"]["b_q"]
     found = json.dumps(value["value"])[:4]
     assert f'b_q(unit="{value["unit"]}") = {found}' in (study / result["model"]).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("verdict", "code"), [("not-tested", 3), ("missing-effect", 0)])
+def test_a_study_in_which_no_effect_could_be_tried_leaves_with_3(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, verdict: str, code: int
+):
+    done = SimpleNamespace(open=lambda: SimpleNamespace(result={"verdict": verdict}))
+    concluded: list[object] = []
+    monkeypatch.setattr(StudyOptions, "ask", lambda *given: None)
+    monkeypatch.setattr(StudyOptions, "conduct", lambda *given: done)
+    monkeypatch.setattr(StudyOptions, "conclude", lambda self, what: concluded.append(what))
+    assert cli.run_command(["diagnose", str(DRIVEN), "-o", str(tmp_path / "study")]) == code
+    assert concluded == [done], "the result is shown all the same"

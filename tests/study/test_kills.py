@@ -1,5 +1,6 @@
 """Studies that are cut short at random moments end with the undisturbed result, whatever kind they are."""
 
+import contextlib
 import errno
 import json
 import multiprocessing
@@ -14,10 +15,12 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
 from thsa_cosim.api.conduct import KINDS, ask
+from thsa_cosim.batch import LocalRunner
 from thsa_cosim.errors import MachineError
 from thsa_cosim.scenario import Executor
 from thsa_cosim.study import Place, Progress
@@ -141,8 +144,6 @@ def test_a_study_that_is_killed_ten_times_ends_like_the_undisturbed_one(study: s
 @pytest.mark.slow
 def test_what_was_run_is_not_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second attempt at a tuning that was killed late runs the rest only, within a generation, too."""
-    from thsa_cosim.batch import LocalRunner
-
     counts: list[int] = []
     plain = LocalRunner.run
 
@@ -159,6 +160,43 @@ def test_what_was_run_is_not_run_again(tmp_path: Path, monkeypatch: pytest.Monke
     counts.clear()
     run("tune", table4(), tmp_path / "cut")
     assert 0 < sum(counts) < 0.5 * undisturbed
+
+
+@pytest.mark.nightly
+def test_a_diagnosis_that_is_killed_ends_like_the_undisturbed_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed at ten random runs: each attempt recalls what the ones before have run."""
+    data = shipped("driven.toml")
+    for role in ("fit", "validate"):
+        table = pd.read_parquet(SCENARIOS / "recordings" / f"undeclared_{role}_1.parquet").head(2500)
+        table.to_parquet(tmp_path / f"{role}.parquet")
+        data["recordings"][role] = [str(tmp_path / f"{role}.parquet")]
+    data["diagnose"] |= {"effects": ["windage"], "package": str(ROOT / "modelica" / "THSA"), "most": 1}
+    ran, limit, plain = 0, 10**9, LocalRunner.run
+
+    def counted(self: Any, jobs: Any, on_outcome: Any = None) -> Any:
+        def note(index: int, outcome: Any) -> None:
+            nonlocal ran
+            if on_outcome is not None:
+                on_outcome(index, outcome)
+            ran += 1
+            if ran >= limit:
+                raise Killed
+
+        return plain(self, jobs, note)
+
+    monkeypatch.setattr(LocalRunner, "run", counted)
+    whole, _ = run("diagnose", data, tmp_path / "whole")
+    total, chance = ran, random.Random(4)
+    for _ in range(10):
+        ran, limit = 0, chance.randrange(1, total // 4)
+        with contextlib.suppress(Killed):
+            run("diagnose", data, tmp_path / "cut")
+    ran, limit = 0, 10**9
+    cut, _ = run("diagnose", data, tmp_path / "cut")
+    assert ran < total
+    assert json.loads(json.dumps(cut).replace("/cut/", "/whole/")) == whole
 
 
 # -- the machine's faults -----------------------------------------------------------------------------

@@ -17,8 +17,6 @@ from thsa_cosim.scenario.source import Source, about_kind, read_source
 from thsa_cosim.scenario.system import open_model
 from thsa_cosim.scenario.tune_drawn import checked_line, checked_pareto, checked_surface
 from thsa_cosim.scenario.tune_model import (
-    LOOP_METRICS,
-    METRICS,
     Axis,
     CommandSpec,
     ControlCostSpec,
@@ -27,7 +25,7 @@ from thsa_cosim.scenario.tune_model import (
     ScheduleSpec,
     TuneScenario,
 )
-from thsa_cosim.scenario.tune_schema import ConditionTable, RequirementTable, TuneTable
+from thsa_cosim.scenario.tune_schema import LOOP_METRICS, METRICS, ConditionTable, RequirementTable, TuneTable
 from thsa_cosim.scenario.tune_uncertainty import read_uncertainty
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import convert

@@ -13,22 +13,6 @@ from thsa_cosim.scenario.tune_schema import LineTable, MetricsTable, ParetoTable
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import convert
 
-#: Metric → (unit, scale of an excess that counts as 1).
-METRICS = {
-    "rise_time": ("s", 0.1),
-    "steady_state_error": ("1", 1e-3),
-    "overshoot": ("1", 0.01),
-    "settling_time": ("s", 0.1),
-    "tracking_error": ("", 1.0),
-    "peak": ("", 1.0),
-    "effort": ("", 1.0),
-    "gain_margin": ("dB", 10.0),
-    "phase_margin": ("deg", 10.0),
-    "bandwidth": ("Hz", 10.0),
-}
-LOOP_METRICS = ("gain_margin", "phase_margin", "bandwidth")
-TERMS = ("tracking", *METRICS)
-
 
 @dataclass(frozen=True, eq=False)
 class CommandSpec:

@@ -23,7 +23,7 @@ def attribution(part: Part) -> Section | None:
     if not balance:
         return None
     columns = [Column("balance equation", numeric=False), Column("unit", numeric=False), Column("rmse")]
-    columns += [Column("noise"), Column("share of the residual"), Column("at fault", numeric=False)]
+    columns += [Column("noise"), Column("no noise, of its own residual"), Column("at fault", numeric=False)]
     rows = [
         (
             text_cell(b["equation"]),
@@ -109,8 +109,10 @@ def _shares(part: Part, balance: list[Json]) -> Figure:
         "",
         colour=colours,
     )
-    drawn.axes(x="balance equation [–]", y="share of the residual [%]")
-    return drawn.build("Share of the repeatable residual by balance equation; the one at fault is marked.")
+    drawn.axes(x="balance equation [–]", y="no noise, of its own residual [%]")
+    return drawn.build(
+        "What of each balance's own residual is no noise: the shares do not add up. What does not close is marked."
+    )
 
 
 @dataclass(frozen=True, eq=False)

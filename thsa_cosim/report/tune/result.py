@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from thsa_cosim.scenario.tune_schema import METRICS
 from thsa_cosim.tune import Pareto, ScheduleResult, Scored, Surface, TuneResult
 from thsa_cosim.tune.combine import equation_7
 
@@ -103,9 +104,8 @@ def term_units(result: TuneResult) -> dict[str, str]:
     """The unit of every term of the cost and the requirements."""
     scenario = result.scenario
     unit = scenario.cost.unit
-    units = {"tracking": f"({unit})²", "rise_time": "s", "settling_time": "s", "tracking_error": unit}
-    units |= {"steady_state_error": "1", "overshoot": "1", "gain_margin": "dB", "phase_margin": "deg"}
-    units |= {"bandwidth": "Hz"}
+    units = {name: own for name, (own, _) in METRICS.items() if own}
+    units |= {"tracking": f"({unit})²", "tracking_error": unit}
     for name in result.terms:
         signal = scenario.metrics.effort if name == "effort" else name.partition(".")[2]
         if name not in units and signal:

@@ -63,7 +63,12 @@
       layout.height += named ? legend : 0;
     }
     if (layout.legend) Object.assign(layout.legend, { orientation: "v", yref: "container", y: 1, yanchor: "top" });
-    for (const axis of panels.flatMap((panel) => [panel.x, panel.y])) axis.nticks = 5;
+    const bars = figure.data.some((trace) => trace.type === "bar");  // every bar keeps its name, upright
+    for (const axis of panels.flatMap((panel) => (bars ? [panel.y] : [panel.x, panel.y]))) axis.nticks = 5;
+    if (bars) {
+      for (const panel of panels) panel.x.tickangle = -90;
+      layout.height += 80;
+    }
     for (const axis of panels.map((panel) => panel.x)) delete axis.dtick;
     for (const note of layout.annotations || []) {
       note.font = { size: 11 };

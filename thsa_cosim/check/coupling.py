@@ -21,12 +21,10 @@ def system_lines(description: SystemDescription) -> Iterator[tuple[str, Judged]]
     parts = description.system.components
     shown = ", ".join(f"{c.name} ({c.execution}{'' if c.step is None else f', {c.step:g} s'})" for c in parts)
     yield "description", (Verdict.OK, f"a system of {len(parts)}: {shown}", {"components": len(parts)})
-    missing = [c.name for c in parts if not set(platform_folders(c.fmu.fmi_version)) & set(c.fmu.platforms)]
-    text = (
-        f"no library for this machine in {', '.join(missing)}"
-        if missing
-        else "every component has a binary for here"
-    )
+    here = {*platform_folders("2.0"), *platform_folders("3.0")}
+    missing = [c.name for c in parts if not here & set(c.fmu.platforms)]
+    lacking = f"no library for this machine in {', '.join(missing)}"
+    text = lacking if missing else "every component has a binary for here"
     yield "platform", (Verdict.FAILED if missing else Verdict.OK, text, {})
     found = loops(description.system)
     text = f"solved at every evaluation: {'; '.join(found)}" if found else "none"

@@ -29,11 +29,17 @@ TIME = np.linspace(0.0, 1.0, 101)
 INPUTS = Signals(TIME, {"u": np.sin(5.0 * TIME)}, {"u": "m/s"})
 
 
+def _host() -> int:
+    """Process of the cluster that runs this: a supervisor stands between it and each of its workers."""
+    status = Path(f"/proc/{os.getppid()}/stat").read_text()
+    return int(status.rsplit(")", 1)[1].split()[1])
+
+
 class SumOfSquares:
     """A reducer; pickled with the experiment."""
 
     def __call__(self, signals: Signals) -> FloatArray:
-        return np.array([np.sum(signals["y"] ** 2), float(os.getppid())])
+        return np.array([np.sum(signals["y"] ** 2), float(_host())])
 
 
 def experiment(**options: object) -> Experiment:

@@ -4,6 +4,7 @@ The product of neighbouring samples has the mean 0 for white noise whatever its 
 for anything that is smooth over a sample: unlike the root mean square it does not need the noise to be known.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -123,7 +124,7 @@ def block_squares(trials: Sequence[Trial], residual: FloatArray, seconds: float 
     seconds = min(seconds, sum(float(end - begin) for begin, end in spans) / FEWEST)
     sums: list[FloatArray] = []
     for trial, (begin, end), squares in zip(trials, spans, per_trial(trials, residual**2), strict=True):
-        count = max(1, round(float(end - begin) / seconds))
+        count = max(1, math.ceil(round(float(end - begin) / seconds, 6)))
         own = np.zeros(count)
         for channel in trial.case.channels:
             block = np.floor((channel.time - begin) / (end - begin) * count).astype(int)

@@ -7,9 +7,10 @@ tested again. A model that lacks something leaves structure that no slip explain
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from thsa_cosim.inspection.across import SLIPS, slip
 from thsa_cosim.inspection.finding import Finding, Severity
@@ -35,6 +36,8 @@ _SHORT = 0.3
 """Sampling steps below which a delay is the sampling's own."""
 _LAGS = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 32.0, 50.0, 80.0)
 _STEPS = 24
+_MOST_SLOPES = 20
+"""Parameters up to which a delay is settled together with them: it takes twenty factorisations."""
 _MOST = 3
 _LEAST = 200
 
@@ -58,8 +61,16 @@ class _Slip:
 class _Rest:
     """The residuals (N,) of one recording over all of its channels, less what parameters and found slips explain."""
 
-    def __init__(self, own: Sequence[Residual], stacked: FloatArray, basis: FloatArray, first: int) -> None:
+    def __init__(
+        self,
+        own: Sequence[Residual],
+        stacked: FloatArray,
+        slopes: FloatArray,
+        basis: FloatArray,
+        first: int,
+    ) -> None:
         self.own = own
+        self._stacked, self._slopes = stacked, slopes
         self.rows = [slice(first + sum(r.values.size for r in own[:k]), 0) for k in range(len(own))]
         self.rows = [slice(s.start, s.start + r.values.size) for s, r in zip(self.rows, own, strict=True)]
         self._basis = basis
@@ -84,6 +95,17 @@ class _Rest:
         left = self.values - self.without(column)
         return float(self.values @ self.values - left @ left)
 
+    def beside_late(self, column: FloatArray, which: Sequence[int], by: float) -> float:
+        """Sum of squares after ``column`` where what parameters do to the channels ``which`` is late ``by`` s, too."""
+        slopes = self._slopes.copy()
+        for k in which:
+            rows, time = self.rows[k], self.own[k].time
+            for i in range(slopes.shape[1]):
+                slopes[rows, i] = np.interp(time - by, time, slopes[rows, i])
+        basis, left = _orthonormal(slopes), self._stacked - column
+        left = left - basis @ (basis.T @ left)
+        return float(left @ left)
+
     def take(self, column: FloatArray) -> None:
         """Take ``column`` into what is explained."""
         free = self.without(column)
@@ -107,12 +129,13 @@ def misfits(residuals: Sequence[Residual]) -> list[Finding]:
     if not residuals or any(r.simulated.size != r.values.size or not _usable(r) for r in residuals):
         return []
     stacked = np.concatenate([r.values for r in residuals])
-    basis = _orthonormal(np.concatenate([r.slopes for r in residuals]))
+    slopes = np.concatenate([r.slopes for r in residuals])
+    basis = _orthonormal(slopes)
     found: list[Finding] = []
     first = 0
     for name in dict.fromkeys(r.recording for r in residuals):
         own = [r for r in residuals if r.recording == name]
-        found += _recording(_Rest(own, stacked, basis, first))
+        found += _recording(_Rest(own, stacked, slopes, basis, first))
         first += sum(r.values.size for r in own)
     return found
 
@@ -152,7 +175,8 @@ def _recording(rest: _Rest) -> Iterator[Finding]:
         least = _UNIT_SHARE if best.kind in ("gain", "common-delay") else _SHARE
         if best.gain < _SURE * floor or best.gain < least * excess:
             return
-        finding = _finding(rest, best, best.gain / excess)
+        share = best.gain / excess
+        finding = _finding(rest, _settled_delay(rest, best) if best.kind.endswith("delay") else best, share)
         if finding is None:
             return
         yield finding
@@ -214,23 +238,40 @@ def _delayed(rest: _Rest, which: Sequence[int], channel: str) -> Iterator[_Slip]
     """The channels ``which`` later (earlier) than simulated, by the delay that explains most."""
     step = float(np.median(np.diff(rest.own[which[0]].time)))
 
-    def late(by: float) -> FloatArray:
-        column = np.zeros(rest.values.size)
-        for k in which:
-            r = rest.own[k]
-            shifted = np.interp(r.time - by, r.time, r.simulated)
-            column[rest.rows[k]] = (r.simulated - shifted) / r.noise
-        return column
-
     lags = [sign * lag * step for lag in _LAGS for sign in (1.0, -1.0)]
-    best = max(lags, key=lambda by: rest.drop(late(by)))
+    best = max(lags, key=lambda by: rest.drop(_late(rest, which, by)))
     width = 0.5 * abs(best)
     for _ in range(3):
         near = np.linspace(best - width, best + width, 7)
-        best = float(max(near, key=lambda by: rest.drop(late(float(by)))))
+        best = float(max(near, key=lambda by: rest.drop(_late(rest, which, float(by)))))
         width /= 3.0
-    column = late(best)
+    column = _late(rest, which, best)
     yield _Slip("delay", channel, column, best, rest.drop(column))
+
+
+def _late(rest: _Rest, which: Sequence[int], by: float) -> FloatArray:
+    """What is left (N,) of channels that are late ``by`` s."""
+    column = np.zeros(rest.values.size)
+    for k in which:
+        r = rest.own[k]
+        shifted = np.interp(r.time - by, r.time, r.simulated)
+        column[rest.rows[k]] = (r.simulated - shifted) / r.noise
+    return column
+
+
+def _settled_delay(rest: _Rest, best: _Slip) -> _Slip:
+    """The delay once more, now that what parameters do is late as well: a wrong one hid a part of it."""
+    if rest.own[0].slopes.shape[1] > _MOST_SLOPES:
+        return best
+    every = range(len(rest.own))
+    which = [k for k in every if best.kind == "common-delay" or rest.own[k].channel == best.channel]
+
+    def left(by: float) -> float:
+        return rest.beside_late(_late(rest, which, by), which, by)
+
+    ends = sorted((0.5 * best.size, 2.0 * best.size))
+    found = minimize_scalar(left, bounds=ends, method="bounded", options={"maxiter": 20})
+    return replace(best, size=float(found.x))
 
 
 def _common_delay(rest: _Rest) -> Iterator[_Slip]:
@@ -256,16 +297,16 @@ def _finding(rest: _Rest, best: _Slip, share: float) -> Finding | None:
     if best.kind == "drift":
         if abs(best.size) * length < 2.0 * _SMALL * residual.noise:
             return None
-        text = (
-            f"{name} drifts by {best.size * length:.3g} {unit} over the recording against the model, {explained}"
-        )
+        text = f"{name} drifts by {best.size * length:.3g} {unit} over the recording against the model, {explained}"
         return Finding(residual.recording, name, "drift", "warning", text)
     if abs(best.size) < _SMALL * residual.noise:
         return None
     more = "more" if best.size > 0.0 else "less"
     what = f"{name} reads {abs(best.size):.3g} {unit} {more} than the model says"
     if best.kind == "step":
-        text = f"{what} from {best.at:.4g} s on, {explained}: its sensor stepped, or something does there that"
+        text = (
+            f"{what} from {best.at:.4g} s on, {explained}: its sensor stepped, or something does there that"
+        )
         text += " the model lacks"
         where = ((best.at, float(residual.time[-1])),)
         return Finding(residual.recording, name, "step", "warning", text, where)

@@ -192,6 +192,11 @@ double discrete_next(const Instance *c) {
     return DBL_MAX;
 }
 
+Status discrete_update(Instance *c) {
+    (void)c;
+    return OK;
+}
+
 #endif
 
 Status discrete_advance(Instance *c, double end) {
@@ -205,21 +210,33 @@ Status discrete_advance(Instance *c, double end) {
     return OK;
 }
 
-Status discrete_assertions(Instance *c) {
+static Status judge_assertions(Instance *c, int first, int last) {
 #if N_A
     const State *s = &c->s;
     double violated[N_A];
     Status status = OK;
-    if (model_assertions(POINT, violated)) return OK;
-    for (int k = 0; k < N_A; k++) {
-        if (!(violated[k] != 0.0) || c->asserted[k]) continue;
+    if (first == last || model_assertions(POINT, violated)) return OK;
+    for (int k = first; k < last; k++) {
+        const int ends = k >= N_A - N_ENDS;
+        if (!(violated[k] != 0.0) || (c->asserted[k] && !ends)) continue;
+        if (ends) {
+            instance_log(c, DISCARD, LOG_DISCARD, "at time %.15g: %s", s->now.time, model_assertion_text[k]);
+            return DISCARD;
+        }
         c->asserted[k] = 1;
         status = WARNING;
         instance_warn(c, "at time %.15g: %s", s->now.time, model_assertion_text[k]);
     }
     return status;
 #else
-    (void)c;
+    (void)c, (void)first, (void)last;
     return OK;
 #endif
+}
+
+Status discrete_domain(Instance *c) { return judge_assertions(c, N_A - N_ENDS, N_A); }
+
+Status discrete_assertions(Instance *c) {
+    const Status status = judge_assertions(c, 0, N_A - N_ENDS);
+    return discrete_domain(c) == DISCARD ? DISCARD : status;
 }

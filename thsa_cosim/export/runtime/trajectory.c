@@ -188,6 +188,7 @@ static Status follow(Instance *c, Recorder *r) {
         if (end > c->s.now.time) status = cross(c, end);
     }
     if (status == OK && run->done < run->n_times) status = write_here(c, r);
+    if (status == OK && N_ENDS) status = discrete_domain(c);
     return status;
 }
 

@@ -31,7 +31,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"
 NOT_RUN = {
     r"^python3 -m venv ": "the tests run in an environment already",
     r"^(python -m )?pip install ": "what it installs is installed",
-    r"^python -m pytest$": "that is what runs",
+    r"^python -m pytest -n auto$": "that is what runs",
     r"^thsa-cosim demo$": "tests/cli/test_demo.py runs it, shortened as well",
     r"^dask (scheduler|worker)": "does not end; tests/batch/test_cluster.py starts both",
     r"--cluster tcp://host:8786$": "needs the two above; tests/batch/test_cluster.py has them",
@@ -41,7 +41,7 @@ NOT_RUN = {
 """Commands, as regular expressions, that are not run, and why."""
 LAST_SECOND = {"motor.toml": 1.1, "driven_check.toml": 1.0, "bench.toml": 1.1, "driven.toml": 1.5}
 """s at which the recordings of a scenario are cut."""
-KIND_OF = {"command": "table4", "conditions": "table4", "diagnose": "driven"}
+KIND_OF = {"components": "system", "command": "table4", "conditions": "table4", "diagnose": "driven"}
 """Shipped scenario that a fragment with a table of this name belongs to; else ``motor``."""
 FEWER = {
     **{

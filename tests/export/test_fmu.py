@@ -110,9 +110,12 @@ def test_stiff_network_equals_radau(built):
         return [(i1 - i2) / 1e-6, i2 / 1e-3]
 
     reference = solve_ivp(rhs, (0, 5), [0, 0], "Radau", time, rtol=1e-10, atol=1e-12, max_step=0.05)
-    got = simulate(built("StiffRC.mo"), ["u1", "u2", "i2"], time, inputs=source, tolerance=1e-8)
-    np.testing.assert_allclose(got["u1"], reference.y[0], atol=1e-6)
-    np.testing.assert_allclose(got["u2"], reference.y[1], atol=1e-6)
+    # At every sample a step ends: the solver's own error. Between steps the dense output of a stiff state adds to it.
+    for stepping, worst in (("samples", 1e-6), ("free", 5e-6)):
+        with Plant.open(built("StiffRC.mo"), stepping=stepping) as plant:
+            got = plant.run({}, source, ["u1", "u2"], time, tolerance=1e-8)
+        np.testing.assert_allclose(got["u1"], reference.y[0], atol=worst)
+        np.testing.assert_allclose(got["u2"], reference.y[1], atol=1e-6)
 
 
 def test_pendulum_without_friction_keeps_its_energy(built):
@@ -307,6 +310,7 @@ def test_stale_fmu_is_noticed(tmp_path, capsys):
     assert set(found) == {
         "THSA.fmu",
         "THSA_FeedForward.fmu",
+        "Plant.fmu",
         "Gearbox.fmu",
         "Screw.fmu",
         "fmi3/THSA.fmu",

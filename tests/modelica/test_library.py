@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from thsa_cosim.cli import main
+from thsa_cosim.cli import run_command
 from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export.flatten import flatten, list_models
 
@@ -98,12 +98,16 @@ def test_a_misspelt_class_and_a_missing_library_are_named(folder: Path) -> None:
 
 def test_models_are_listed_without_partial_ones(folder: Path) -> None:
     assert list_models(folder / "One.mo") == ["One.A", "One.P.B"]
-    (folder / "Lib 4.1.0" / "Sub" / "Broken.mo").unlink()
-    assert list_models(folder / "Lib 4.1.0") == ["Lib.Inside", "Lib.Sub.Deep", "Lib.Top"]
+    with pytest.warns(UserWarning, match=r"Broken\.mo:3"):
+        assert list_models(folder / "Lib 4.1.0") == ["Lib.Inside", "Lib.Sub.Deep", "Lib.Top"]
 
 
-def test_list_on_the_command_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["export", "--list", "--library", str(folder / "One.mo")])
-    assert not ended.value.code
-    assert capsys.readouterr().out.split() == ["One.A", "One.P.B"]
+def test_list_on_the_command_line_notes_what_cannot_be_read(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command(["export", "--list", "--library", str(folder)]) == 0
+    said = capsys.readouterr()
+    assert said.out.split() == ["Lib.Inside", "Lib.Sub.Deep", "Lib.Top", "One.A", "One.P.B"]
+    assert [line.split(":")[0] for line in said.err.splitlines()] == ["note", "note"]
+    assert "Broken.mo:3" in said.err
+    assert "Unrelated.mo:1" in said.err

@@ -66,12 +66,40 @@ def with_domains(model: CausalModel) -> CausalModel:
         arguments = [expressions[a] for a in graph.nodes[call].arguments]
         condition_here = condition(*arguments)
         for place in guard[call]:
-            condition_here = ca.logic_and(expressions[place] != 0, condition_here)
+            if not _continues(graph, place, graph.nodes[call].arguments[0]):
+                condition_here = ca.logic_and(expressions[place] != 0, condition_here)
         shown = str(arguments[0])
         of = f"{name} of {shown}" if len(shown) <= _LONGEST and "@" not in shown else name
         violated.append(condition_here)
         texts.append(f"{of} in {_owner(model, graph, targets, call)}: it is {fault}")
-    return replace(model, domain=ca.vertcat(*violated), domain_texts=tuple(texts))
+    # Relations as they are here: one that is about to change has not protected its branch.
+    fresh = ca.substitute([ca.vertcat(*violated)], [model.m[: model.g.numel()]], [model.g > 0])[0]
+    return replace(model, domain=fresh, domain_texts=tuple(texts))
+
+
+def continued(call: Callable[[ca.SX], ca.SX], argument: ca.SX) -> ca.SX:
+    """A root with 0 for a negative argument.
+
+    Between events a branch is used a little beyond its border (``if x > 0 then sqrt(x) else 0``), where there has to be
+    a number; what is negative when a step ends is found by the conditions of `with_domains`.
+    """
+    graph = Graph()
+    if argument.is_constant() or _sign(graph, graph.add(argument)):
+        return call(argument)
+    return ca.if_else(argument <= 0, 0, call(argument))
+
+
+def _continues(graph: Graph, place: int, argument: int) -> bool:
+    """Whether a condition is the one of `continued`, which relations of a model never look like."""
+    node = graph.nodes[place]
+    if node.op != ca.OP_NOT:
+        return False
+    inner = graph.nodes[node.arguments[0]]
+    return (
+        inner.op == ca.OP_LE
+        and inner.arguments[0] == argument
+        and graph.nodes[inner.arguments[1]].constant == 0
+    )
 
 
 def _owner(model: CausalModel, graph: Graph, targets: list[int], call: int) -> str:

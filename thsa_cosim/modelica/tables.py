@@ -122,7 +122,9 @@ def interpolate(
     if table.extrapolation == PERIODIC:
         raise evaluator.error(where, "a table that repeats periodically is a limit of this exporter.")
     if table.extrapolation == NONE:
-        raise evaluator.error(where, "a table without extrapolation is a limit of this exporter; choose HoldLastPoint.")
+        raise evaluator.error(
+            where, "a table without extrapolation is a limit of this exporter; choose HoldLastPoint."
+        )
     if table.smoothness not in (LINEAR, AKIMA, CONSTANT):
         raise evaluator.error(where, "a table with monotone splines is a limit of this exporter.")
     if any(b < a or (b == a and table.smoothness == AKIMA) for a, b in pairwise(x)):

@@ -11,6 +11,7 @@ void discrete_reset(Instance *c);                   /* m before the initializati
 double discrete_next(const Instance *c);            /* time of the next time event, DBL_MAX = none */
 Status discrete_advance(Instance *c, double end);   /* solver_advance with time events on the way */
 Status discrete_assertions(Instance *c);            /* WARNING and a message where one fails for the first time, or: */
-Status discrete_domain(Instance *c);                /* DISCARD and a message where one fails that ends the run */
+/* DISCARD and a message where one fails that ends the run. */
+Status discrete_domain(Instance *c, double time, const double *x, const double *u);
 
 #endif

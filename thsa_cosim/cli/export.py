@@ -16,7 +16,7 @@ from thsa_cosim.shipped import modelica_package
     "--package",
     type=PATH,
     default=None,
-    help="Folder of its package; default: modelica/THSA, or the shipped one.",
+    help="Folder of the class's Modelica package; default: modelica/THSA, or the shipped one.",
 )
 @click.option(
     "--library",

@@ -8,8 +8,8 @@ HEAD = """\
 
 # The catalogue of effects
 
-What `thsa-cosim diagnose` tries. A name is followed by the place where a friction pair has several:
-`stribeck:screw`. [One of your own](howto/own-effect.md) joins them as two small files.
+Effects that `thsa-cosim diagnose` tries. A name is followed by the place where a friction pair has several:
+`stribeck:screw`. [An effect of your own](howto/own-effect.md) needs two small files.
 """
 
 

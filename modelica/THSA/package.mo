@@ -5,7 +5,7 @@ package THSA "Electrical trimmable horizontal stabilizer actuator over temperatu
     Documentation(info="<html>
 <p>Multiphysics model of an electrical trimmable horizontal stabilizer actuator (THSA): permanent-magnet
 synchronous motor, gearbox, no-back device, roller screw, nut and stabilizer, velocity and current controllers,
-with every loss a law over temperature. Self-contained; the flanges have the structure of those of the Modelica
+with laws over temperature for the parameters of all losses. Self-contained; the flanges have the structure of those of the Modelica
 Standard Library (a potential angle or position, a flow torque or force), so that its components connect.</p>
 <p>Source of the physics: Ma, Fu, Xia, <em>Optimization Method for the Control Law of an Electrical Trimmable
 Horizontal Stabilizer Actuator Operating at Low Temperatures</em>.</p>

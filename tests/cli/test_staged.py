@@ -81,7 +81,7 @@ def test_points_and_laws_of_all_stages_are_merged(study) -> None:
             assert abs(found["value"] - value) < 4.0 * found["stderr"], name
         b_g = point["parameters"]["b_g"]  # true: about 1e-5
         assert not b_g["identifiable"]
-        assert "cannot be told from zero" in b_g["reason"]
+        assert "cannot be distinguished from zero" in b_g["reason"]
     assert set(result["laws"]) == {"F_fn", "b_n", "T_fg", "b_g"}
     assert set(result["error"]["fit"]) == {"screw:F", "gearbox:F"}
     assert "Gearbox bench" in done.stdout

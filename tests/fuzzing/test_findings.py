@@ -77,7 +77,7 @@ def test_memory_that_does_not_suffice_is_one_sentence(
 
     monkeypatch.setattr("thsa_cosim.check.check_fmu", greedy)
     assert run_command(["check", "any.fmu"]) == 3
-    assert capsys.readouterr().err.startswith("error: the memory does not suffice")
+    assert capsys.readouterr().err.startswith("error: there is not enough memory")
 
 
 @pytest.mark.slow

@@ -17,13 +17,14 @@ def printed(**changes: object) -> str:
 def test_verdict_advice_and_what_looks_alike():
     alike = [{"names": ["backlash", "screw-ripple"], "angle_deg": 0.82}]
     text = printed(equivalence=alike)
-    assert "tell apart" not in printed()
+    assert "could not distinguish" not in printed()
     assert "The model lacks backlash of the screw (backlash)." in text
-    assert "These recordings cannot tell backlash from velocity-sensor-delay." in text
+    assert "These recordings cannot distinguish backlash from velocity-sensor-delay." in text
     assert (
-        "could not tell apart at an ordinary size: backlash, screw-ripple (principal angle 0.82 deg)" in text
+        "could not distinguish effects of a typical size: backlash, screw-ripple (principal angle 0.82 deg)"
+        in text
     )
-    assert "To tell backlash from velocity-sensor-delay, run slow reversals under no load" in text
+    assert "To distinguish backlash from velocity-sensor-delay, run slow reversals under no load" in text
 
 
 def test_empirical_law_is_an_equation_with_units_and_says_whether_it_was_added():
@@ -37,7 +38,7 @@ def test_empirical_law_is_an_equation_with_units_and_says_whether_it_was_added()
 def test_not_tested_and_what_is_left_beside_an_effect_are_said():
     assert "No effect could be tried on this model" in printed(verdict="not-tested", effects=[])
     text = printed(verdict="unexplained-structure", unexplained=0.02)
-    assert "The model lacks backlash of the screw (backlash); beside that, structure is left" in text
+    assert "The model lacks backlash of the screw (backlash); a repeatable residual is left" in text
     assert "(2 % of the repeatable residual in the worst signal)" in text
 
 

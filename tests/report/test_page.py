@@ -130,7 +130,7 @@ def test_summary_comes_first_and_says_what_came_out_and_how_sure_it_is(identifie
     assert "1.900 ± 0.019" in text
     assert "1 of 4 values are not determined by the data: T_fm at −30 °C" in details
     assert "6.0" in text or "6 ×" in text  # rmse 0.3 A against 0.05 A
-    assert "the model lacks something" in details
+    assert "the model does not explain the recordings" in details
     assert "48 evaluations, 6 failed." in details
 
 
@@ -184,16 +184,18 @@ def test_titles_and_labels_overlap_neither_each_other_nor_a_panel(
 def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(diagnosed: Any) -> None:
     page = diagnosed
     summary = page.inner_text("#summary")
-    assert "The model lacks backlash (Backlash of the screw): added to it, the error on held-out" in summary
+    assert (
+        "The model lacks backlash (Backlash of the screw). Adding it lowers the error on held-out" in summary
+    )
     details = page.inner_text("#details")
-    assert "Find out which physical effect THSA.fmu lacks" in details
+    assert "Find the physical effect that THSA.fmu lacks" in details
     assert "THSA_with_backlash.mo, THSA_with_backlash.fmu" in summary
     assert "fmus/THSA.fmu, SHA-256 aaaa" in page.inner_text("#provenance")
     assert "(2.50 ± 0.10)e-4" in summary
-    assert "These recordings cannot tell backlash from velocity-sensor-delay." in summary
+    assert "These recordings cannot distinguish backlash from velocity-sensor-delay." in summary
     assert (
-        "Record slow reversals under no load (experiment.csv): there backlash and velocity-sensor-delay differ by 812"
-        " variances of the noise" in summary
+        "Record slow reversals under no load (experiment.csv). It separates backlash and velocity-sensor-delay: the"
+        " squared difference of the two fitted models is 232 times that in these recordings." in summary
     )
     assert "largest error falls from 5 × the sensor's noise to 1.05 × noise" in details
     assert "2 % of the repeatable residual is left in the worst signal." in summary
@@ -204,13 +206,15 @@ def test_diagnosis_shows_verdict_attribution_structure_and_what_was_weighed(diag
     alike = table_of(page, "Effects that would look alike in these recordings")
     assert cells(alike, "effects") == ["stribeck:motor and stribeck:gearbox"]
     assert cells(alike, "principal angle [deg]") == ["0.82"]
-    law = table_of(page, "Empirical law of what no effect explains ± one standard error")
+    law = table_of(page, "Empirical law of the unexplained residual ± one standard error")
     assert cells(law, "slot") == ["screw", "motor"]
     assert cells(law, "coefficient") == ["0.0310 ± 0.0020", "(2.00 ± 0.10)e-6"]
     found = plots(page)
     scored = table_of(page, "Effects that were fitted and scored on held-out recordings")
     assert cells(scored, "decision") == ["accepted", "rejected"]
-    assert cells(table_of(page, "Effects that promised too little to be fitted"), "effect") == ["windage"]
+    assert cells(table_of(page, "Effects whose predicted gain was too small to fit them"), "effect") == [
+        "windage"
+    ]
     assert cells(table_of(page, "Effects that these recordings cannot test"), "effect") == [
         "winding-self-heating"
     ]

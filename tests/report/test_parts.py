@@ -285,7 +285,7 @@ def test_study_in_stages_that_runs_shows_the_stages_that_have_begun(tmp_path: Pa
     assert found.status == "stopped"  # no process writes a journal
     assert [part.name for part in found.parts] == ["motor", "screw"]
     text = write_page(tmp_path).read_text()
-    assert f"nothing is running; what is done is kept. Continue with: {studies.COMMAND}" in text
+    assert f"Its finished runs are kept. Continue with: {studies.COMMAND}" in text
     assert "6 vectors evaluated of at most 24 in 1 search, 1 failed so far." in text
     assert "12 vectors evaluated of at most 24 in 1 search, 2 failed so far." in text
     for name in ("motor-convergence", "screw-convergence", "motor-part", "screw-part"):
@@ -295,7 +295,7 @@ def test_study_in_stages_that_runs_shows_the_stages_that_have_begun(tmp_path: Pa
 def test_fresh_study_without_a_single_vector_has_a_page(tmp_path: Path) -> None:
     claim_folder(tmp_path, studies.identity("identify"), studies.about())
     text = write_page(tmp_path).read_text()
-    assert "its folder does not tell whether it is running" in text
+    assert "Its folder does not show whether it is still running" in text
     with Journal.open(tmp_path / "journal.csv", ["R_s"], ["i_q"]):
         assert read_study(tmp_path).status == "running"
         assert "0 vectors evaluated in 0 searches, 0 failed so far." in write_page(tmp_path).read_text()

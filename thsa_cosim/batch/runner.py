@@ -17,7 +17,7 @@ class Runner(Protocol):
     """Runs batches of jobs; a context manager."""
 
     notes: Sequence[str]
-    """What whoever opened it found out about its FMUs, one sentence each."""
+    """Findings about its FMUs from the code that opened it, one sentence each."""
 
     def run(self, jobs: Sequence[Job], on_outcome: OnOutcome | None = None) -> list[Outcome]:
         """Run all jobs; outcomes come in the order of the jobs, whatever the number of workers.

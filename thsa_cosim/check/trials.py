@@ -8,12 +8,13 @@ import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome
 from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined, try_input_handling
-from thsa_cosim.check import numerics
+from thsa_cosim.check import coupling, numerics
 from thsa_cosim.check.finding import Finding, Verdict
 from thsa_cosim.fmu import FmuDescription, probe
 from thsa_cosim.fmu.inputs import input_modes, is_ours
 from thsa_cosim.fmu.plant import Backend, Kind, Reuse
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.system.description import SystemDescription
 
 _WARM_UP = 10
 """Cycles before memory is watched: interpreter and allocator settle."""
@@ -145,6 +146,10 @@ class Trials:
     # -- lines ------------------------------------------------------------------------------------------
     def description_lines(self) -> None:
         """Say what the description alone shows."""
+        if isinstance(self._description, SystemDescription):
+            for name, judged in coupling.system_lines(self._description):
+                self._take(name, judged)
+            return
         problems = probe.validation_messages(self._description.path)
         more = f" (and {len(problems) - 3} more)" if len(problems) > 3 else ""
         text = "; ".join(problems[:3]) + more if problems else "fmpy's validation finds no problem"
@@ -316,6 +321,10 @@ class Trials:
 
     def _step_lines(self, halved: Outcome, doubled: Outcome) -> None:
         name = "communication step"
+        if isinstance(self._description, SystemDescription):
+            trial = self._experiment("trial", self._time)
+            self._take(name, coupling.coupling_line(self._description, trial, self._first, self._deadline))
+            return
         if self._kind != "co-simulation":
             self._note(name, Verdict.NOT_TRIED, "Model Exchange: the importer's solver steps")
             return

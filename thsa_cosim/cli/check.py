@@ -28,18 +28,16 @@ FAILED = 3
 @click.command()
 @click.argument("path", type=PATH)
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
-@click.option("-o", "--output", type=PATH, default=None, help="Write the findings as JSON to this file, too.")
-@click.option("--duration", type=POSITIVE, help="FMU: s to simulate; default what it declares.")
-@click.option("--step", type=POSITIVE, help="FMU: s between communication points; default what it declares.")
+@click.option("-o", "--output", type=PATH, default=None, help="Also write the findings as JSON to this file.")
+@click.option("--duration", type=POSITIVE, help="FMU: time to simulate, s; default: its own.")
+@click.option("--step", type=POSITIVE, help="FMU: communication step, s; default: its own.")
 @click.option(
-    "--deadline", type=POSITIVE, default=30.0, show_default=True, help="FMU: s that a run may take."
+    "--deadline", type=POSITIVE, default=30.0, show_default=True, help="FMU: longest time of a run, s."
 )
 @click.option("--start", "starts", multiple=True, metavar="NAME=VALUE", help="FMU: a start value.")
+@click.option("--input", "ends", multiple=True, metavar="NAME=VALUE", help="FMU: final value of an input.")
 @click.option(
-    "--input", "ends", multiple=True, metavar="NAME=VALUE", help="FMU: value that an input runs to."
-)
-@click.option(
-    "--compile", "compiled", type=PATH, help="FMU: first build its C sources; write the FMU to this file."
+    "--compile", "compiled", type=PATH, help="FMU: build its C sources first, and write the FMU to this file."
 )
 def check(
     path: Path,
@@ -52,11 +50,11 @@ def check(
     ends: tuple[str, ...],
     compiled: Path | None,
 ) -> int:
-    """Say what an FMU, a recording or a scenario is, and what it can be trusted with.
+    """Describe an FMU, a recording or a scenario, and say what it can be trusted with.
 
-    PATH is told by its ending: .toml is a scenario, .csv, .parquet, .mat and the like a recording, all else an FMU.
-    An FMU is run in processes of its own with inputs that move, up to its stop time; that of a scenario with the
-    scenario's own recordings, step and start values. The exit code is 3 if the verdict is "failed".
+    The ending of PATH decides: .toml is a scenario; .csv, .parquet, .mat and the like are recordings; all else is an
+    FMU. An FMU runs in separate processes, with moving inputs, up to its stop time; the FMU of a scenario runs with
+    the scenario's recordings, step and start values. The exit code is 3 if the verdict is "failed".
     """
     if compiled is not None:
         from thsa_cosim.fmu.sources import compile_sources

@@ -1,4 +1,4 @@
-"""The command ``demo``: the whole loop on the shipped data, each step as the command that does it."""
+"""The command ``demo``: every main command on the shipped data, step by step."""
 
 import importlib.util
 import json
@@ -44,14 +44,14 @@ class Step:
     type=PATH,
     default=Path("demo"),
     show_default=True,
-    help="Folder; an existing one continues.",
+    help="Folder; an existing demo is continued.",
 )
-@click.option("--quick", is_flag=True, help="Fewer temperatures and recordings.")
+@click.option("--quick", is_flag=True, help="Use fewer temperatures and recordings.")
 def demo(output: Path, quick: bool) -> None:
-    """Run the whole loop on the shipped data: export, check, identify, tune, diagnose, report.
+    """Run every main command on the shipped data: export, check, identify, tune, diagnose.
 
-    Each step is a command of its own, which is shown with what it found. Takes a few minutes. The data are copied into
-    the folder, unless this is a checkout of the repository; index.html there links the pages.
+    Each step prints its command and its result. The demo takes a few minutes. It copies the data into the folder,
+    unless this is a checkout of the repository. Open index.html in the folder at the end.
     """
     from rich.text import Text
 
@@ -80,8 +80,8 @@ def demo(output: Path, quick: bool) -> None:
         picture = None if step.folder is None else step.folder / "plots" / step.picture
         effects = _effects(step)
         entries.append(Entry(step.title, step.why, step.words, tuple(found), seconds, page, picture, effects))
-    index = write_index(output / "index.html", "thsa-cosim: the whole loop on the shipped data", entries)
-    click.echo(f"\nAll of it took {time.monotonic() - begin:.0f} s. Open {index}")
+    index = write_index(output / "index.html", "thsa-cosim: demo on the shipped data", entries)
+    click.echo(f"\nThe demo took {time.monotonic() - begin:.0f} s. Open {index}")
 
 
 def _steps(root: Path, output: Path, quick: bool, can_export: bool) -> list[Step]:
@@ -98,21 +98,21 @@ def _steps(root: Path, output: Path, quick: bool, can_export: bool) -> list[Step
     return [
         Step(
             "Export the actuator's Modelica model as an FMU",
-            "Equations become C code with an exact Jacobian, and a solver goes with them into one .fmu file.",
+            "The equations become C code with an exact Jacobian; the .fmu file holds it and a solver.",
             ("export", "THSA.Actuator", "--package", str(root / "modelica" / "THSA"), *host, "-o", str(fmu)),
             lambda: [f"{fmu.name} of {fmu.stat().st_size / 1e6:.1f} MB"],
             needs_exporter=True,
         ),
         Step(
             "Check what the FMU can be trusted with",
-            "Repeated, reset and finer-stepped runs are compared, as they should be with any FMU.",
+            "Compares repeated runs, runs after a reset and runs with a smaller step. Do this with every FMU.",
             ("check", str(fmu), "-o", str(checked)),
             lambda: _checked(checked),
         ),
         Step(
             "Identify the motor from its bench recordings, over temperature",
-            "A differential evolution and a least-squares polish find four parameters at each temperature; laws go "
-            "through them.",
+            "Least squares from several starts finds four parameters at each temperature; a law over temperature is "
+            "fitted to each.",
             ("identify", str(scenarios / "motor.toml"), *fit, "-o", str(identify)),
             lambda: _identified(identify),
             identify,
@@ -120,7 +120,7 @@ def _steps(root: Path, output: Path, quick: bool, can_export: bool) -> list[Step
         ),
         Step(
             "Tune the velocity controller at -30 degC against 55 kN",
-            "The same search finds gains for a ramp, within limits on overshoot, current, bandwidth and margins.",
+            "Differential evolution finds gains for a ramp, with limits on overshoot, current, bandwidth, margins.",
             ("tune", str(scenarios / "table4.toml"), "--fmu", str(fmu), "-o", str(tune)),
             lambda: _tuned(tune),
             tune,
@@ -128,8 +128,8 @@ def _steps(root: Path, output: Path, quick: bool, can_export: bool) -> list[Step
         ),
         Step(
             "Diagnose a recording that shows an effect the model lacks",
-            "The residual is traced to an effect of the catalogue, which is added to the Modelica model and judged by "
-            "recordings that no fit touched.",
+            "Finds the effect of the catalogue that explains the residual, adds it to the Modelica model, and scores "
+            "the result on held-out recordings.",
             ("diagnose", str(scenarios / "driven.toml"), *(one if quick else ()), "-o", str(diagnose)),
             lambda: _diagnosed(diagnose),
             diagnose,
@@ -177,8 +177,8 @@ def _identified(folder: Path) -> list[str]:
             ratios.setdefault(name, []).append(error["rmse"] / error["noise"] if error["noise"] else math.nan)
     left = ", ".join(f"{name} {sum(own) / len(own):.2f}" for name, own in ratios.items())
     return [
-        f"laws from {len(result['points'])} temperatures deviate from the published ones by at most: {told}",
-        f"errors left, in units of the sensors' noise: {left}",
+        f"laws from {len(result['points'])} temperatures deviate from the published laws by at most: {told}",
+        f"rmse / noise of the sensors: {left}",
     ]
 
 
@@ -204,7 +204,7 @@ def _diagnosed(folder: Path) -> list[str]:
     for name, error in result["before"]["validate"].items():
         after = result["after"]["validate"].get(name, error)  # nothing was added: there is no after
         left.append(f"{name} {error['rmse'] / error['noise']:.2f} → {after['rmse'] / after['noise']:.2f}")
-    return [f"verdict: {result['verdict']}", *found, f"held-out errors in units of noise: {', '.join(left)}"]
+    return [f"verdict: {result['verdict']}", *found, f"held-out rmse / noise: {', '.join(left)}"]
 
 
 def _known(stderr: float | None) -> float:

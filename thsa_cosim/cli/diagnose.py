@@ -14,7 +14,7 @@ NOT_TESTED = 3
 @study_options
 @click.option("--package", type=PATH, default=None, help="Folder of the model's Modelica package.")
 def diagnose(options: StudyOptions, package: Path | None) -> None:
-    """Find what the model of SCENARIO lacks: trace the residual to an effect, add it, report held-out errors."""
+    """Find the effect that the model of SCENARIO lacks, add it, and report held-out errors before and after."""
     done = options.conduct(options.ask("diagnose", package))
     options.conclude(done)
     if done.open().result["verdict"] == "not-tested":

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 dry_run_option = click.option(
     "--dry-run",
     is_flag=True,
-    help="Say what would run and how long it would take; run a few simulations only.",
+    help="Print what would run and how long it would take, after a few timed simulations.",
 )
 
 

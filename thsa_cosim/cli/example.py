@@ -13,7 +13,7 @@ from thsa_cosim.cli.options import PATH, console
 def example(name: str | None, output: Path) -> None:
     """Copy the shipped scenario NAME with its FMU, recordings and Modelica package; without NAME, list all.
 
-    Nothing that differs is overwritten.
+    A file that exists with other content is never overwritten.
     """
     from thsa_cosim.shipped import copy_example, examples
 

@@ -14,11 +14,11 @@ from thsa_cosim.errors import ThsaCosimError
 @click.option(
     "--export-fmu/--no-export-fmu",
     default=None,
-    help="Write the FMU anew with what was identified; default: only of a scenario with stages.",
+    help="Also write the FMU with the identified values; default: only for a scenario with stages.",
 )
 @dry_run_option
 def identify(options: StudyOptions, export_fmu: bool | None, dry_run: bool) -> None:
-    """Identify parameters from recordings as SCENARIO says, point by point over temperature."""
+    """Identify the parameters of SCENARIO from its recordings, at each temperature."""
     from thsa_cosim.report.parameter_files import write_identified_fmu
     from thsa_cosim.scenario import StagedScenario
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     type=PATH,
     multiple=True,
     required=True,
-    help="A measured file; may be repeated.",
+    help="A file of measured signals; may be repeated.",
 )
 @click.option(
     "-o",
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
 def init(fmu: Path, recordings: tuple[Path, ...], output: Path) -> None:
     """Write a commented scenario that drives an FMU with a recording and compares.
 
-    Columns are matched to the FMU's inputs and outputs by name, description and unit; what fits nowhere is listed in
-    the file. It runs as it is. A page beside it shows the recordings as the scenario reads them, with what was found in
-    them.
+    Columns are matched to the FMU's inputs and outputs by name, description and unit; columns without a
+    match are listed in the file. The scenario runs as it is. An HTML page next to it shows the recordings as the
+    scenario reads them, with the findings of the data check.
     """
     from thsa_cosim.draft import draft_scenario
     from thsa_cosim.report.inspection import print_inspection
@@ -52,15 +52,17 @@ def init(fmu: Path, recordings: tuple[Path, ...], output: Path) -> None:
     try:
         scenario = load_scenario(output)
     except InputError as error:
-        raise InputError(f"The scenario was written, but needs your hand: {error}") from None
+        raise InputError(
+            f"{output} was written, but does not load yet; correct it by hand: {error}"
+        ) from None
     print_inspection(console(), scenario.data, remedies=True)
     preview = write_preview(scenario, draft, output.with_suffix(".html"))
     click.echo(f"\nThe recordings as the scenario reads them: {preview}")
     if draft.undriven:
         names = ", ".join(variable.name for variable in draft.undriven)
         click.echo(
-            f"{output} is not ready: nothing drives {names}, so that the model rests; name the column under"
-            f" [recordings.columns.{draft.undriven[0].name}], if it is not meant to be constant."
+            f"{output} is not ready: nothing drives {names}, so the model stays at rest; name the column under"
+            f" [recordings.columns.{draft.undriven[0].name}] unless it is constant."
         )
         return
     click.echo(f"{output} is ready: thsa-cosim simulate {output}")
@@ -88,4 +90,4 @@ def _print(draft: "Draft") -> None:
         out.print(Text(f"column {name!r} is not used: it {reason}"))
     if draft.unmatched_columns:
         names = ", ".join(column.name for column in draft.unmatched_columns)
-        out.print(Text(f"columns that fit nowhere: {names}"))
+        out.print(Text(f"columns without a match: {names}"))

@@ -64,7 +64,7 @@ class _Cli(click.Group):
 @click.group(cls=_Cli, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="thsa-cosim")
 def cli() -> None:
-    """Identify and tune electromechanical actuators on FMUs, from Modelica models and bench recordings."""
+    """Identify, tune and diagnose electromechanical actuators with FMUs and bench recordings."""
 
 
 for _command in COMMANDS:
@@ -88,7 +88,7 @@ def run_command(arguments: list[str]) -> int:
     except ThsaCosimError as error:
         return _fail(str(error), error.exit_code)
     except Interrupted as interruption:
-        return _fail(f"interrupted; what is done is kept, continue with: {interruption}", 130, label=False)
+        return _fail(f"interrupted; finished runs are kept, continue with: {interruption}", 130, label=False)
     except (KeyboardInterrupt, click.Abort):
         return _fail("interrupted; the same command starts again, or continues its study.", 130, label=False)
     except BrokenPipeError:
@@ -99,7 +99,7 @@ def run_command(arguments: list[str]) -> int:
         where = f" ({error.filename})" if error.filename else ""
         return _fail(f"{error.strerror or error}{where}.", 2)
     except MemoryError:
-        return _fail("the memory does not suffice: use shorter recordings, longer steps or fewer workers.", 3)
+        return _fail("there is not enough memory: use shorter recordings, longer steps or fewer workers.", 3)
     except Exception as error:
         detail = " ".join(f"{type(error).__name__}: {error}".split())[:300]
         return _fail(f"internal fault, please report it: {detail} (THSA_COSIM_DEBUG=1 shows where).", 3)

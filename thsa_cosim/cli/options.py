@@ -115,20 +115,35 @@ class StudyOptions:
 
 _OPTIONS = (
     click.argument("scenario", type=PATH),
-    click.option("--fit", type=PATH, multiple=True, help="A recording to fit, instead of the scenario's."),
-    click.option("--validate", type=PATH, multiple=True, help="A recording to hold out, likewise."),
+    click.option(
+        "--fit",
+        type=PATH,
+        multiple=True,
+        help="A recording to fit, in place of the scenario's; may be repeated.",
+    ),
+    click.option(
+        "--validate",
+        type=PATH,
+        multiple=True,
+        help="A recording to hold out, in place of the scenario's; may be repeated.",
+    ),
     click.option(
         "-o", "--output", type=PATH, default=None, help="Study folder; an existing one is continued."
     ),
-    click.option("--seed", type=click.IntRange(min=0), default=None, help="Seed instead of the scenario's."),
-    click.option("--fmu", type=PATH, default=None, help="FMU instead of the scenario's."),
     click.option(
-        "--workers", type=click.IntRange(min=1), default=None, help="Processes; default: all cores."
+        "--seed", type=click.IntRange(min=0), default=None, help="Seed, in place of the scenario's."
     ),
-    click.option("--cluster", default=None, help="Address of a Dask scheduler instead of local processes."),
-    click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors."),
-    click.option("--json", "as_json", is_flag=True, help="Print result.json instead of tables."),
-    click.option("--report/--no-report", default=True, show_default=True, help="Write report.html as well."),
+    click.option("--fmu", type=PATH, default=None, help="FMU, in place of the scenario's."),
+    click.option(
+        "--workers",
+        type=click.IntRange(min=1),
+        default=None,
+        help="Number of worker processes; default: all cores.",
+    ),
+    click.option("--cluster", default=None, help="Address of a Dask scheduler, to run on several machines."),
+    click.option("--quiet", "-q", is_flag=True, help="Print errors only."),
+    click.option("--json", "as_json", is_flag=True, help="Print result.json, not tables."),
+    click.option("--report/--no-report", default=True, show_default=True, help="Write the page report.html."),
 )
 """In the order in which help shows them."""
 

@@ -12,7 +12,7 @@ from thsa_cosim.cli.options import PATH
 @click.option("-o", "--output", type=PATH, default=None, help="The file to write; default DIR/report.html.")
 @click.option("--open", "show", is_flag=True, help="Show the page in the browser.")
 def report(folder: Path, output: Path | None, show: bool) -> None:
-    """Write the HTML page of the study in DIR, finished or running: results, plots, provenance in one file."""
+    """Write the HTML page of the study in DIR, finished or running: results, plots and provenance in one file."""
     from thsa_cosim.report.page import write_page
 
     page = write_page(folder, output)

@@ -8,5 +8,5 @@ from thsa_cosim.cli.options import StudyOptions, study_options
 @click.command()
 @study_options
 def simulate(options: StudyOptions) -> None:
-    """Run SCENARIO once per recording and compare; parameters to be identified keep their start values."""
+    """Simulate each recording of SCENARIO once and compare; parameters to identify keep their start values."""
     options.conclude(options.conduct(options.ask("simulate")))

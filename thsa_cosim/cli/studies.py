@@ -30,12 +30,12 @@ def list_command(folder: Path | None, as_json: bool) -> None:
 
 @click.command()
 @click.argument("folders", metavar="A B ...", type=PATH, nargs=-1, required=True)
-@click.option("-o", "--output", type=PATH, default=None, help="Write the comparison as an HTML page, too.")
+@click.option("-o", "--output", type=PATH, default=None, help="Also write the comparison as an HTML page.")
 @click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")
 def compare(folders: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
-    """Say what differs between study folders: parameters, effects, errors, settings, each against the first.
+    """Compare study folders with the first one: parameters, effects, errors and settings that differ.
 
-    A difference comes with its standard error and z, the difference in standard errors.
+    Each difference is given with its standard error and with z, the difference divided by that error.
     """
     from thsa_cosim.report.compare import compare as compared
     from thsa_cosim.report.compare.page import write_comparison

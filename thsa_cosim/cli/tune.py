@@ -10,7 +10,7 @@ from thsa_cosim.cli.options import StudyOptions, study_options
 @study_options
 @dry_run_option
 def tune(options: StudyOptions, dry_run: bool) -> None:
-    """Tune gains for the commands and conditions that SCENARIO describes; schedule them if it asks."""
+    """Tune the gains of SCENARIO for its command and conditions; schedule them if it asks for that."""
     asked = options.ask("tune")
     if dry_run:
         show_forecast(options, asked)

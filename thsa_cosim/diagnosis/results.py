@@ -46,7 +46,7 @@ class Value:
 
 @dataclass(frozen=True)
 class FoundEffect:
-    """An effect that was added: its parameters, what these recordings cannot tell it from, and how sure it is."""
+    """An effect that was added: its parameters, its equivalents in these recordings, and its probability."""
 
     name: str
     title: str
@@ -59,7 +59,7 @@ class FoundEffect:
 
 @dataclass(frozen=True)
 class Judged:
-    """A candidate that was looked at: ``held_out_gain`` in variances of the noise, ``decision`` and its ``reason``."""
+    """A candidate that was weighed: ``held_out_gain`` in noise variances, ``decision`` and its ``reason``."""
 
     name: str
     variant: str
@@ -122,7 +122,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class SeparatingExperiment:
-    """The experiment that tells rivals apart best: ``inputs`` over time, ``distance`` in variances of the noise."""
+    """The experiment that separates rivals best: ``inputs`` over time, ``distance`` in noise variances."""
 
     name: str
     rivals: tuple[str, str]
@@ -150,7 +150,7 @@ class EmpiricalTerm:
 
 @dataclass(frozen=True)
 class EmpiricalLaw:
-    """What describes the structure that no effect explains; ``held_out_gain`` in variances of the noise."""
+    """An empirical law of the structure that no effect explains; ``held_out_gain`` in noise variances."""
 
     terms: tuple[EmpiricalTerm, ...]
     held_out_gain: float

@@ -229,7 +229,7 @@ class _Closing:
         base = self.found.base
         if self.found.base_cost > self.before.fit.cost - 1.0:
             return self.before
-        self.study.place.say("identifying the declared model from where the search came to")
+        self.study.place.say("identifying the declared model, starting from the result of the search")
         return self._identify(
             self.scenario.fmu.path, self.unknowns, [self.before.fit.vector, base.vector], ()
         )

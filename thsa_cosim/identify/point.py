@@ -307,7 +307,7 @@ def _estimates(point: PointProblem, best: FloatArray, uncertainty: Uncertainty |
             stderr = size if np.isfinite(size) else None
             reason = uncertainty.reasons[i]
             if not reason and stderr is not None and CLEAR_OF_ZERO * stderr > abs(value):
-                reason = f"it cannot be told from zero: one standard error is {stderr:.2g} {parameter.unit}"
+                reason = f"it cannot be distinguished from zero: one standard error is {stderr:.2g} {parameter.unit}"
         estimates[parameter.name] = Estimate(
             value=value,
             unit=parameter.unit,

@@ -48,6 +48,6 @@ def note_on(names: tuple[str, ...]) -> list[str]:
     listed = ", ".join(names)
     verb = "changes" if len(names) == 1 else "change"
     return [
-        f"{listed} {verb} no output of the FMU at all, in no recording: a start value that is not taken, evaluated "
-        f"at export, or without a role in these recordings; take it out of [[parameters]]."
+        f"{listed} {verb} no output of the FMU in any recording: the FMU ignores the start value, or evaluated it at "
+        f"export, or these recordings do not excite it; remove it from [[parameters]]."
     ]

@@ -94,7 +94,7 @@ def _channel(channel: str, own: Sequence[Residual]) -> list[str]:
     structure = float(np.mean([_predictable(r.values) for r in own])) if own else 0.0
     if structure > _STRUCTURE:
         reasons.append(
-            f"what is left of {channel} is no noise: neighbours account for {100 * structure:.0f} % of it"
+            f"what is left of {channel} is not noise: neighbouring samples account for {100 * structure:.0f} % of it"
         )
     follows = [found for r in own if (found := _follows(r)) is not None]
     if follows:

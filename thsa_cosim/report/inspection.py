@@ -39,7 +39,7 @@ def print_inspection(
         console.print(Text(f"repaired: {sentence}"), soft_wrap=True)
     lines = list(dict.fromkeys(f.remedy for f in data.findings if f.remedy and f.severity != "note"))
     if remedies and lines:
-        console.print("\nLines for the scenario that would deal with it (each is a choice of yours):")
+        console.print("\nLines for the scenario that repair this; each is your choice:")
         for text in _merged(lines):
             console.print(Text(text), soft_wrap=True)
 
@@ -74,9 +74,7 @@ def print_trust(console: Console, trust: Trust) -> None:
     if trust.verdict == "explained":
         return
     line = Text("not explained: ", style="red")
-    line.append(
-        "the values above are not to be believed, since the model leaves more than noise", style="default"
-    )
+    line.append("do not trust the values above: the model leaves more than noise", style="default")
     console.print(line, soft_wrap=True)
     for reason in trust.reasons:
         console.print(Text(f"  {reason}"), soft_wrap=True)

@@ -77,6 +77,6 @@ def _manifest_entry(fmu: Path) -> tuple[dict[str, Any], Path]:
         except (OSError, ValueError, KeyError, TypeError):
             continue
     raise InputError(
-        f"{fmu} is in no manifest.json beside it, so its Modelica class is unknown; load identified.ssv into it"
-        " instead."
+        f"{fmu} is not listed in a manifest.json in its folder, so its Modelica class is unknown; load"
+        " identified.ssv into it instead."
     )

@@ -47,7 +47,7 @@ def _mapping(draft: Draft) -> str:
 def _findings(scenario: Scenario) -> str:
     rows = [(f.severity, f.recording, f.channel, f.kind, f.text) for f in scenario.data.findings]
     if not rows:
-        return "<p>Nothing was found in the recordings that a fit would suffer from.</p>"
+        return "<p>The recordings have no defect that would affect a fit.</p>"
     return _table(("severity", "recording", "signal", "what", "finding"), rows)
 
 

@@ -69,7 +69,7 @@ class ColumnTable(Table):
     offset: Moderate = 0.0
     """Then this is added, in the file's unit."""
     shift: Moderate = 0.0
-    """s; moves the signal to later times (negative: takes a sensor's lag out)."""
+    """s; moves the signal to later times (negative: removes the lag of a sensor)."""
     smooth: Literal["none", "mean", "piecewise-linear"] = "none"
     """``"mean"`` replaces the signal by its mean, ``"piecewise-linear"`` (inputs) by plateaus and ramps."""
     noise: Positive | None = None
@@ -78,7 +78,7 @@ class ColumnTable(Table):
     interpolation: Literal["linear", "hold"] = "linear"
     """``"hold"``: the value stays until the next sample, as a digital command does."""
     time: Name | None = None
-    """A time column of its own, in the unit of ``[recordings.time]``; left out: that of all columns."""
+    """Time column of this column, in the unit of ``[recordings.time]``; left out: the common one."""
     missing: list[Moderate] | None = None
     """Numbers of the file that mean "no value", such as ``[-9999.0]``; with any list, also ``[]``, blank cells mean it,
     too. Such samples are left out: an output is not compared there, an input runs straight over them."""
@@ -199,7 +199,7 @@ class TemperatureTable(Table):
     input: Name | None = None
     """The FMU input whose mean is a recording's temperature; either this or ``column``."""
     column: Name | None = None
-    """A column of the file that is no FMU signal."""
+    """A column of the file that is not an FMU signal."""
     unit: str | None = None
     """Unit of that column."""
     round_to: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0

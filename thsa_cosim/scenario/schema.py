@@ -83,7 +83,7 @@ class ParameterTable(Table):
     description: str = ""
     """For tables; left out: the FMU's."""
     per: Literal["point", "recording"] = "point"
-    """``"recording"``: a value of its own for every recording of a point (an offset, say)."""
+    """``"recording"``: a separate value for each recording of a point, such as an offset."""
     zero: list[Name] = Field(default_factory=list)
     """FMU parameters (names or globs) that are 0 in every run."""
     law_block: Name | None = None
@@ -146,7 +146,7 @@ class CostTable(Table):
     error: ErrorName = "squared"
     """f in equation 6."""
     also: list[ErrorName] = Field(default_factory=list)
-    """Further f, evaluated at the estimate and reported beside it."""
+    """Further f, evaluated at the estimate and reported in addition."""
     channels: dict[Name, ChannelTable] = Field(default_factory=dict)
     window: WindowTable = WindowTable()
     mask: list[list[float]] = Field(default_factory=list)
@@ -227,7 +227,7 @@ class ForceTable(Table):
     band: Positive = 20.0
     """Hz."""
     period: Positive | None = None
-    """s after which the motion repeats; what its laps differ by is printed beside the residual."""
+    """s after which the motion repeats; the difference between laps is printed with the residual."""
 
 
 class CommonTable(ModelTable):
@@ -318,15 +318,15 @@ class DiagnoseOptionsTable(Table):
     catalogue: Name | None = None
     """A folder with effects of your own, one ``.py`` file each."""
     most: Annotated[int, Field(ge=1, le=10)] = 3
-    """At most so many effects are added."""
+    """Largest number of effects that are added."""
     spread: Positive = 0.1
     """Relative standard deviation of a declared parameter about the drawing; ``parameters.spread`` wins over it."""
     command: Name | None = None
-    """The input that commands the drive, and ..."""
+    """The input that commands the drive; a separating experiment may vary it."""
     load: Name | None = None
-    """... the one that loads it: what a separating experiment may vary."""
+    """The input that loads the drive; a separating experiment may vary it."""
     empirical: bool = False
-    """Add an empirical law to the model where structure is left that no effect explains."""
+    """Add an empirical law to the model if a repeatable residual is left that no effect explains."""
     balances: list[BalanceTable] = Field(default_factory=list)
     blackbox: BlackBoxTable | None = None
 

@@ -314,7 +314,7 @@ class TuneTable(ModelTable):
     conditions: dict[Name, ConditionTable] = Field(default_factory=dict)
     parameters: list[GainTable] = Field(min_length=1)
     before: dict[Name, float] = Field(min_length=1)
-    """A value of every parameter: what is tuned is held against it."""
+    """A value of every parameter; the tuned values are compared with it."""
     compare: dict[Name, dict[Name, float]] = Field(default_factory=dict)
     """Further sets of values, by name: all of them, as in ``before``."""
     metrics: MetricsTable

@@ -23,6 +23,7 @@ from thsa_cosim.fmu.point import Point
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.system.description import SystemDescription
 from thsa_cosim.system.stepped import Stepped
+from thsa_cosim.system.structure import Component
 from thsa_cosim.system.wiring import Port, Wiring
 
 _EVENT_ITERATIONS = 100
@@ -73,11 +74,16 @@ class SystemInstance(Instance):
             part = self.parts[component.name]
             with _named(component.name):
                 part.instantiate()
-                if component.start:
-                    variables = [part.description.variable(n) for n in component.start]
-                    values = np.array(list(component.start.values()), dtype=np.float64)
-                    part.set_values(part.channels(variables), values)
+            self._give_start(component)
         self.handle = 1
+
+    def _give_start(self, component: Component) -> None:
+        if component.start:
+            part = self.parts[component.name]
+            variables = [part.description.variable(n) for n in component.start]
+            values = np.array(list(component.start.values()), dtype=np.float64)
+            with _named(component.name):
+                part.set_values(part.channels(variables), values)
 
     def initialize_begin(self, start: float, stop: float, tolerance: float | None) -> None:
         """Bring every component into Initialization Mode."""
@@ -116,9 +122,10 @@ class SystemInstance(Instance):
             part.terminate()
 
     def reset(self) -> None:
-        """Bring every component back to the state after instantiation."""
-        for part in self.parts.values():
-            part.reset()
+        """Bring every component back to the state after instantiation, with its own start values."""
+        for component in self._system.components:
+            self.parts[component.name].reset()
+            self._give_start(component)
 
     def free(self) -> None:
         """Destroy every instance that lives."""

@@ -95,7 +95,7 @@ def choice(own: Fit, names: str = "ab", neutral: float = 0.0) -> Any:
     )
 
 
-SAYS = "cogging:motor: its coefficients cannot be told from zero"
+SAYS = "cogging:motor: its coefficients cannot be distinguished from zero"
 
 
 def test_existence_is_three_standard_errors():

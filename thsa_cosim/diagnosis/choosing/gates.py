@@ -97,7 +97,7 @@ def insignificant(choice: Scored) -> str:
     distance = moved / size
     statistic = float(distance @ np.linalg.pinv(alike, hermitian=True) @ distance)
     if not known.any() or statistic < chi2.isf(2.0 * norm.sf(SIGMAS), np.count_nonzero(known)):
-        return f"{choice.candidate.name}: its coefficients cannot be told from zero"
+        return f"{choice.candidate.name}: its coefficients cannot be distinguished from zero"
     return ""
 
 

@@ -102,7 +102,7 @@ class Comparison:
             parts.append(f"{listing(apart)} {'differs' if len(apart) == 1 else 'differ'} beyond chance")
         elif told:
             parts.append("no value differs beyond chance")
-        text = "; ".join(parts) or "no uncertainty is known, so nothing can be told from chance"
+        text = "; ".join(parts) or "no uncertainty is known, so no difference can be tested"
         return text[0].upper() + text[1:] + (f" (|z| > {NOTABLE_Z:g})." if apart or told else ".")
 
     def _effects(self) -> dict[str, list[bool]]:
@@ -243,13 +243,13 @@ def _notes(studies: Sequence[Study], rows: Sequence[Row]) -> Iterator[str]:
     known = [_recordings(study) for study in studies]
     if any(known[0] & other for other in known[1:]):
         yield (
-            "Some studies fitted the same recordings, so their estimates are not independent: take standard errors of"
-            " differences, and z, as a hint."
+            "Some studies fitted the same recordings, so their estimates are not independent: standard errors of"
+            " differences, and z, are only approximate."
         )
     unsure = [r.name for r in rows if any(v is not None and not v.determined for v in r.values)]
     if unsure:
         names = ", ".join(dict.fromkeys(unsure))
-        yield f"Not determined by the data of some study, so without a standard error of the difference: {names}."
+        yield f"Not determined by the data of at least one study, hence no standard error of the difference: {names}."
     other = [r.name for r in rows if not r.same_unit]
     if other:
         yield f"In different units, so not subtracted: {', '.join(dict.fromkeys(other))}."

@@ -86,7 +86,9 @@ def _parameters(found: Comparison) -> Figure | None:
         ticks = {"tickvals": list(range(len(places))), "ticktext": [chart.plain(p) for p in places]}
         span = [-0.6, len(places) - 0.4]
         drawn.axes(*at, y=f"{name} [{own[0].unit}]", x_options={"tickmode": "array", **ticks, "range": span})
-    return drawn.build("Values with 95 % intervals; intervals that do not overlap differ beyond chance.")
+    return drawn.build(
+        "Values with 95 % intervals; values whose intervals do not overlap differ significantly."
+    )
 
 
 def _errors(found: Comparison) -> Figure | None:

@@ -41,9 +41,10 @@ def evidence(part: Part) -> Figure | None:
     )
     return drawn.build(
         f"What the balance “{found['equation']}” leaves open in {found['left']} over {found['cause']}, on"
-        f" {role_text(found['part']).replace(' ', '-')} recordings: means in bins with 95 % intervals, and what"
-        " either model puts there."
-        f" {percent(found['share'])} of it depends on {found['cause']}. Re-tuning explains none of what is shown."
+        f" {role_text(found['part']).replace(' ', '-')} recordings: means in bins with 95 % intervals, and the"
+        " same from either model."
+        f" {percent(found['share'])} of it depends on {found['cause']}. Re-fitting the declared parameters explains"
+        " none of it."
     )
 
 

@@ -23,7 +23,11 @@ def attribution(part: Part) -> Section | None:
     if not balance:
         return None
     columns = [Column("balance equation", numeric=False), Column("unit", numeric=False), Column("rmse")]
-    columns += [Column("noise"), Column("no noise, of its own residual"), Column("at fault", numeric=False)]
+    columns += [
+        Column("noise"),
+        Column("not noise, share of its residual"),
+        Column("at fault", numeric=False),
+    ]
     rows = [
         (
             text_cell(b["equation"]),
@@ -94,10 +98,10 @@ def _law_table(law: Json) -> Table:
         else "not added to the model (diagnose.empirical = true adds it)"
     )
     note = (
-        f"v, z, N: speed, position and load in the slot; held-out gain {number(law.get('held_out_gain'), 3)} variances"
-        f" of the noise; {fate}. A law describes and does not explain."
+        f"v, z, N: speed, position and load in the slot; held-out gain {number(law.get('held_out_gain'), 3)} noise"
+        f" variances; {fate}. The law is descriptive, not physical."
     )
-    return Table("Empirical law of what no effect explains ± one standard error", columns, rows, note)
+    return Table("Empirical law of the unexplained residual ± one standard error", columns, rows, note)
 
 
 def _shares(part: Part, balance: list[Json]) -> Figure:
@@ -109,9 +113,10 @@ def _shares(part: Part, balance: list[Json]) -> Figure:
         "",
         colour=colours,
     )
-    drawn.axes(x="balance equation [–]", y="no noise, of its own residual [%]")
+    drawn.axes(x="balance equation [–]", y="not noise, share of its residual [%]")
     return drawn.build(
-        "What of each balance's own residual is no noise: the shares do not add up. What does not close is marked."
+        "Share of the residual of each balance that is not noise; the shares do not add up. Marked: balances that"
+        " do not close."
     )
 
 
@@ -163,5 +168,5 @@ def _figure(name: str, panels: list[_Panel], height: int = 210) -> Figure:
         drawn.level(0.0, at=at)
         drawn.axes(*at, x=f"{panel.variable} [{panel.unit}]", y=f"{panel.channel} [{panel.channel_unit}]")
     return drawn.build(
-        "Mean residual in bins of what it may depend on, with 95 % intervals; at 0 nothing is left."
+        "Mean residual over possible causes, in bins, with 95 % intervals; 0 means nothing is left."
     )

@@ -15,22 +15,24 @@ Content = Mapping[str, Any]
 def sentence(content: Content) -> str:
     """The verdict as a test engineer would say it."""
     if content["verdict"] == "no-missing-effect":
-        return "No missing effect: what is left is noise, or declared parameters that were tuned again."
+        return "No missing effect: what is left is noise, or is explained by re-fitted declared parameters."
     effects = content["effects"]
     found = " and ".join(f"{e['title'][0].lower()}{e['title'][1:]} ({_place(e)})" for e in effects)
     if content["verdict"] == "missing-effect":
         text = f"The model lacks {found}."
         ties = [f"{e['name']} from {', '.join(e['equivalent'])}" for e in effects if e["equivalent"]]
         if ties:
-            text += f" These recordings cannot tell {' and '.join(ties)}."
+            text += f" These recordings cannot distinguish {' and '.join(ties)}."
         return text
     if content["verdict"] == "not-tested":
         return "No effect could be tried on this model and these recordings: see the notes."
     share = f"{100 * content['unexplained']:.0f} % of the repeatable residual in the worst signal"
     if found:
-        text = f"The model lacks {found}; beside that, structure is left that no effect of the catalogue explains"
+        text = (
+            f"The model lacks {found}; a repeatable residual is left that no effect of the catalogue explains"
+        )
         return f"{text} ({share})."
-    return f"Structure is left that no effect of the catalogue explains ({share})."
+    return f"A repeatable residual is left that no effect of the catalogue explains ({share})."
 
 
 def _place(effect: Mapping[str, Any]) -> str:
@@ -105,7 +107,7 @@ def _forces(content: Content) -> list[str]:
 def _faults(content: Content) -> list[str]:
     """The balance equations that do not close."""
     return [
-        f"The balance {b['equation']} does not close: {b['rmse']:.3g} {b['unit']}, where the sensors' noise makes"
+        f"The balance {b['equation']} does not close: {b['rmse']:.3g} {b['unit']}, where the sensors' noise explains"
         f" {b['noise']:.3g}."
         for b in content["balance"]
         if b["at_fault"]
@@ -127,8 +129,8 @@ def empirical_law(content: Content) -> list[str]:
         else "empirical = true in [diagnose] adds it to the model."
     )
     return [
-        f"Empirical law, which describes and does not explain: {terms}; held-out gain"
-        f" {number(law['held_out_gain'], 3)} variances of the noise. {fate}"
+        f"Empirical law (descriptive, not physical): {terms}; held-out gain"
+        f" {number(law['held_out_gain'], 3)} noise variances. {fate}"
     ]
 
 
@@ -137,10 +139,10 @@ def _unit(unit: str) -> str:
 
 
 def _alike(content: Content) -> list[str]:
-    """What would look like a named effect in these recordings, at an ordinary size; the page has all classes."""
+    """What these recordings cannot distinguish from a named effect of a typical size; the page has all classes."""
     named = {e["name"] for e in content["effects"]}
     return [
-        f"These recordings could not tell apart at an ordinary size: {', '.join(c['names'])} (principal angle"
+        f"These recordings could not distinguish effects of a typical size: {', '.join(c['names'])} (principal angle"
         f" {number(c['angle_deg'], 2)} deg)."
         for c in content["equivalence"]
         if named & set(c["names"])
@@ -153,7 +155,7 @@ def _advice(content: Content) -> list[str]:
     rivals = [name for e in content["effects"] for name in e["equivalent"]]
     if best is None or not rivals:
         return []
-    return [f"To tell {' from '.join(best['rivals'])}, run {best['name']} ({best['file']})."]
+    return [f"To distinguish {' from '.join(best['rivals'])}, run {best['name']} ({best['file']})."]
 
 
 def _undetermined(content: Content) -> list[str]:

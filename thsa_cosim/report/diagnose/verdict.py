@@ -20,11 +20,11 @@ from thsa_cosim.report.parts.text import (
 from thsa_cosim.report.signal_files import read_signals, signal_paths, signal_units
 
 _VERDICTS = {
-    "missing-effect": "The model lacks {effects}: added to it, the error on held-out recordings falls.",
-    "no-missing-effect": "The model lacks nothing that these recordings show: what is left is noise, or declared"
-    " parameters that were tuned again.",
-    "unexplained-structure": "Something repeatable is left that no effect of the catalogue explains; see on what it"
-    " depends.",
+    "missing-effect": "The model lacks {effects}. Adding it lowers the error on held-out recordings.",
+    "no-missing-effect": "The model lacks nothing that these recordings show. What is left is noise, or is explained by"
+    " re-fitted declared parameters.",
+    "unexplained-structure": "A repeatable residual is left that no effect of the catalogue explains; the section on"
+    " structure shows what it depends on.",
     "not-tested": "No effect could be tried on this model and these recordings.",
 }
 
@@ -36,7 +36,7 @@ def verdict(result: Json) -> tuple[Block, ...]:
     names = listing([_name(e) for e in effects])
     sentence = _VERDICTS.get(word, word).format(effects=names)
     if word == "unexplained-structure" and effects:
-        sentence = f"The model lacks {names}. Beside that, s" + sentence[1:]
+        sentence = f"The model lacks {names}. In addition, a" + sentence[1:]
     blocks: list[Block] = [Text(sentence, "lead good" if word == "no-missing-effect" else "lead bad")]
     if effects:
         blocks.append(_effects_table(effects))
@@ -50,7 +50,7 @@ def verdict(result: Json) -> tuple[Block, ...]:
         )
     alike = [f"{e['name']} from {listing(e['equivalent'])}" for e in effects if e.get("equivalent")]
     if alike:
-        facts.append(("not told apart", f"These recordings cannot tell {listing(alike)}."))
+        facts.append(("not distinguished", f"These recordings cannot distinguish {listing(alike)}."))
     facts += _experiment(result.get("experiment"))
     files = [str(result[key]) for key in ("model", "fmu") if result.get(key)]
     if files:
@@ -81,7 +81,7 @@ def recordings_table(result: Json) -> list[Block]:
             )
             line.append(Cell(text, before if after is None else after, ratio_mark(after)))
         cells.append(line)
-    note = "rmse / noise: 1 is all that a model can reach. Before → after; green is down to the noise."
+    note = "rmse / noise, before → after. 1 is the best that a model can reach. Green: the error equals the noise."
     return [Table("Errors before → after, as multiples of the noise", columns, cells, note)]
 
 
@@ -114,9 +114,9 @@ def held_out(result: Json) -> str:
         return ""
     now = number(max(ratios[0]), 3)
     if not ratios[1]:
-        return f"On recordings that no fit has seen the largest error is {now} × the sensor's noise."
+        return f"On held-out recordings the largest error is {now} × the sensor's noise."
     return (
-        f"On recordings that no fit has seen the largest error falls from {now} × the sensor's noise to"
+        f"On held-out recordings the largest error falls from {now} × the sensor's noise to"
         f" {number(max(ratios[1]), 3)} × noise."
     )
 
@@ -164,7 +164,7 @@ def _errors_table(rows: list[_Pair], units: Json) -> Table:
         )
     note = (
         "Before: the declared model, its parameters identified again. After: the extended model likewise. Structure:"
-        " the part of the residual that is no noise."
+        " the part of the residual that is not noise."
     )
     return Table("Errors before and after", columns, table, note)
 
@@ -177,9 +177,7 @@ def _declared_table(before: Json, after: Json) -> Table:
         own = [value, after.get(name) or {}]
         cells = [Cell(plus_minus(v.get("value"), v.get("stderr")), v.get("value")) for v in own]
         rows.append((text_cell(name), text_cell(value.get("unit", "")), *cells))
-    return Table(
-        "Declared parameters, identified again with either model ± one standard error", columns, rows
-    )
+    return Table("Declared parameters of each model, re-identified, ± one standard error", columns, rows)
 
 
 def recordings(part: Part) -> Section | None:
@@ -203,8 +201,10 @@ def candidates(part: Part) -> Section | None:
             _candidates_table("Effects that were fitted and scored on held-out recordings", refined)
         )
     if others:
-        table = _candidates_table("Effects that promised too little to be fitted", others)
-        blocks.append(Fold(f"{count(len(others), 'effect')} that promised too little to be fitted", (table,)))
+        table = _candidates_table("Effects whose predicted gain was too small to fit them", others)
+        blocks.append(
+            Fold(f"{count(len(others), 'effect')} with a predicted gain that was too small", (table,))
+        )
     if skipped:
         rows = [(text_cell(s["name"]), text_cell(s.get("reason", ""))) for s in skipped]
         columns = (Column("effect", numeric=False), Column("why not", numeric=False))
@@ -213,14 +213,18 @@ def candidates(part: Part) -> Section | None:
     if alike:
         rows = [(text_cell(listing(c["names"])), number_cell(c["angle_deg"], 2)) for c in alike]
         columns = (Column("effects", numeric=False), Column("principal angle [deg]"))
-        note = "At an ordinary size; in the first round. The angle is between what they do to the signals."
+        note = "For effects of a typical size, in the first round. The angle is between their responses in the signals."
         blocks.append(Table("Effects that would look alike in these recordings", columns, rows, note))
     return Section(f"{part.prefix}candidates", "Effects that were weighed", tuple(blocks)) if blocks else None
 
 
 def _effects_table(effects: list[Json]) -> Table:
     columns = [Column("effect", numeric=False), Column("probability"), Column("parameter", numeric=False)]
-    columns += [Column("value"), Column("unit", numeric=False), Column("cannot be told from", numeric=False)]
+    columns += [
+        Column("value"),
+        Column("unit", numeric=False),
+        Column("not distinguished from", numeric=False),
+    ]
     rows = []
     for effect in effects:
         likely, alike = effect.get("probability"), listing(effect.get("equivalent") or [])
@@ -231,11 +235,11 @@ def _effects_table(effects: list[Json]) -> Table:
             text = plus_minus(value["value"], value.get("stderr"))
             own = (text_cell(name), Cell(text, value["value"]), text_cell(value.get("unit", "")))
             rows.append((*named, *own, text_cell(alike)))
-    return Table("What came out: effects with their parameters ± one standard error", columns, rows)
+    return Table("Result: effects with their parameters ± one standard error", columns, rows)
 
 
 def _probability(share: float | None) -> str:
-    """``99 %``; never 100 %, of which no recording makes sure."""
+    """``99 %``; never 100 %, because no recording can prove it."""
     return "> 99.9 %" if share is not None and share > 0.999 else percent(share, 3)
 
 
@@ -263,8 +267,8 @@ def _candidates_table(title: str, weighed: list[Json]) -> Table:
         for one in weighed
     ]
     note = (
-        "Gains: by how much the sum of squared residuals falls beyond what declared parameters explain, in variances of"
-        " the noise; held-out on recordings that no fit has seen."
+        "Gain: decrease of the sum of squared residuals (in units of the noise variance) beyond what the declared"
+        " parameters explain. Held-out gain: the same on recordings that no fit has used."
     )
     return Table(title, columns, rows, note)
 
@@ -289,7 +293,7 @@ def _ratios_figure(part: Part, rows: list[_Pair]) -> Figure:
     drawn.level(1.0)
     drawn.axes(y="rmse / noise [1]", x="signal and recordings [–]", y_options={"rangemode": "tozero"})
     return drawn.build(
-        "Errors as multiples of the sensor's noise; dotted: the noise, which no model gets below."
+        "Errors as multiples of the sensor's noise. Dotted: the noise, which no model can go below."
     )
 
 
@@ -297,12 +301,10 @@ def _experiment(content: Json | None) -> list[tuple[str, str]]:
     """What to record next, as a fact."""
     if not content:
         return []
-    apart = number(content.get("distance"), 3)
-    now = number(content.get("present"), 3)
-    return [
-        (
-            "to tell them apart",
-            f"Record {content['name']} ({content.get('file', 'experiment.csv')}): there {listing(content['rivals'])}"
-            f" differ by {apart} variances of the noise, in these recordings by {now}.",
-        )
-    ]
+    distance, present = content.get("distance"), content.get("present")
+    file, rivals = content.get("file", "experiment.csv"), listing(content["rivals"])
+    text = f"Record {content['name']} ({file}). It separates {rivals}"
+    if distance and present:
+        ratio = f"{distance / present:.2g}" if distance < 10.0 * present else f"{distance / present:.0f}"
+        text += f": the squared difference of the two fitted models is {ratio} times that in these recordings"
+    return [("next experiment", f"{text}.")]

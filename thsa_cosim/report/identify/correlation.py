@@ -49,9 +49,7 @@ def _pairs(points: list[Json]) -> Table:
     for (a, b), values in found.items():
         cells = [_cell(values.get(k)) for k in range(len(points))]
         rows.append((text_cell(a), text_cell(b), *cells))
-    note = (
-        f"From −1 to 1; marked from {STRONG:g} up in size: the data then determine a combination of the two."
-    )
+    note = f"From −1 to 1; marked from {STRONG:g} up in size: the data then determine only a combination of the two."
     return Table("Correlation of the estimates, pair by pair", columns, rows, note)
 
 
@@ -75,7 +73,7 @@ def _profiles_figure(part: Part, profiles: list[tuple[Json, str, Json]]) -> Figu
         drawn.axes(*at, x=f"{name} [{point['parameters'][name]['unit']}]", y="rise of the cost [1]")
         drawn.title(f"{name}, {degrees(point['temperature_degC'])}", *at)
     return drawn.build(
-        "Profile likelihoods: the least cost with the parameter held, over its value at the optimum."
+        "Profile likelihoods: the lowest cost with the parameter fixed, divided by the cost at the optimum."
     )
 
 

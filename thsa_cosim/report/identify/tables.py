@@ -41,7 +41,7 @@ def search_sentences(points: Sequence[PointResult]) -> list[str]:
 
 
 def laws_table(result: IdentifyResult) -> Table:
-    """Identified laws beside the published ones."""
+    """Identified laws compared with the published ones."""
     table = Table(title="Laws over temperature (t in °C)", title_justify="left")
     for heading in ("parameter", "unit", "form", "identified", "published"):
         table.add_column(heading, overflow="fold")
@@ -110,7 +110,7 @@ def errors_table(result: IdentifyResult) -> Table:
 
 
 def force_sentence(force: ForceBalance) -> str:
-    """The force residual by role, beside what the laps differ by."""
+    """The force residual by role, with the differences between laps."""
     by_role = ", ".join(f"{number(rms, 3)} {force.unit} ({role})" for role, rms in force.rms.items())
     laps = (
         ""

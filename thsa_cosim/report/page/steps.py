@@ -22,10 +22,10 @@ def met(study: Study) -> Text:
         met = (
             "the model explains the recordings down to the noise"
             if worst is not None
-            else "nothing was compared"
+            else "no signal was compared"
         )
         return Text(f"{found}: {met}.", "lead" + (" bad" if unsure else " good"))
-    lacks = "lacks something" if worst > MISSED else "leaves a little unexplained"
+    lacks = "does not explain the recordings" if worst > MISSED else "leaves a small residual unexplained"
     text = f"{found}, but the model {lacks}: the largest error is {number(worst, 3)} × the sensor's noise."
     return Text(text, "lead bad" if worst > MISSED else "lead")
 
@@ -36,16 +36,16 @@ def next_steps(study: Study) -> list[str]:
     data = result.get("data") or {}
     steps = []
     if data.get("verdict") == "bad":
-        steps.append("Repair the recordings first: the section on the data names what is wrong with them.")
+        steps.append("Repair the recordings first. The section on the data lists their defects.")
     if study.status != "complete":
         return steps
     if kind == "diagnose":
         steps += _after_diagnosis(result)
     elif kind == "tune":
         steps.append(
-            "Put the gains into the controller, and check them on the bench at the worst condition below."
+            "Use the gains in the controller, and check them on the bench at the worst condition listed below."
             if result.get("feasible")
-            else "Relax a requirement or widen the bounds of the gains: no set keeps all of them."
+            else "Relax a requirement or widen the bounds of the gains: no set of gains meets all requirements."
         )
     else:
         unsure = {
@@ -54,12 +54,14 @@ def next_steps(study: Study) -> list[str]:
         at_bound = {n for p in result.get("points", []) for n, e in p["parameters"].items() if bound_text(e)}
         worst = max((r for _, _, e in all_errors(study) if (r := noise_ratio(e)) is not None), default=0.0)
         if at_bound:
-            steps.append(f"Widen the bounds of {listing(sorted(at_bound))}: a value sits on one of them.")
+            steps.append(f"Widen the bounds of {listing(sorted(at_bound))}: a value lies on a bound.")
         if unsure:
-            steps.append(f"Record what moves {listing(sorted(unsure))}, or hold it at a known value.")
+            steps.append(
+                f"Record an experiment that excites {listing(sorted(unsure))}, or fix it at a known value."
+            )
         if worst > MISSED:
             steps.append(
-                "Find what the model lacks: thsa-cosim diagnose, with this model and these recordings."
+                "Run thsa-cosim diagnose with this model and these recordings to find the missing effect."
             )
     if not steps and kind == "identify":
         steps.append(f"Use the values: {folder / 'identified.ssv'} holds them for any FMI tool.")
@@ -72,18 +74,18 @@ def _after_diagnosis(result: Json) -> list[str]:
     if result.get("experiment") and any(e.get("equivalent") for e in result.get("effects", [])):
         best = result["experiment"]
         steps.append(
-            f"Record {best['name']} ({best.get('file', 'experiment.csv')}): it tells the rivals apart."
+            f"Record {best['name']} ({best.get('file', 'experiment.csv')}): it separates the equivalent effects."
         )
     if word == "missing-effect" and result.get("fmu"):
         steps.append(
             f"Use the extended model {result['model']}, or its FMU {result['fmu']}, in place of the declared one."
         )
     if word == "no-missing-effect":
-        steps.append("Keep the model; use the declared parameters as they were identified here.")
+        steps.append("Keep the model, with the parameters that were identified here.")
     if word == "unexplained-structure":
         steps.append(
-            "See below on what the residual depends; add an effect of your own (docs/howto/own-effect.md)."
+            "See below what the residual depends on, then add an effect of your own (docs/howto/own-effect.md)."
         )
     if word == "not-tested":
-        steps.append("Record something that excites the effects, or give the model slots for them.")
+        steps.append("Record an experiment that excites the effects, or add effect slots to the model.")
     return steps

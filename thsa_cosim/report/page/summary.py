@@ -27,10 +27,10 @@ from thsa_cosim.report.tune.gains import term_label
 from thsa_cosim.report.tune.responses import first_response
 
 _STATUS = {
-    "running": "The study is running; this is how far it is. The same command writes the page anew.",
-    "stopped": "The study was stopped before its end and nothing is running; what is done is kept.",
-    "unfinished": "The study has not ended yet; its folder does not tell whether it is running.",
-    "interrupted": "The study was interrupted; these are the results of what was finished by then.",
+    "running": "The study is running. These are its results so far; the report command writes the page again.",
+    "stopped": "The study was stopped before its end. Its finished runs are kept.",
+    "unfinished": "The study has not ended. Its folder does not show whether it is still running.",
+    "interrupted": "The study was interrupted. These are the results of its finished part.",
 }
 
 
@@ -57,14 +57,14 @@ def summary(study: Study) -> Section:
 def details(study: Study) -> Section | None:
     """What was asked, and how sure the answer is."""
     asked = () if study.whole.result is None else (_question_facts(study),)
-    sure = Facts([("how sure", text) for text in _sure(study)])
+    sure = Facts([("confidence", text) for text in _sure(study)])
     notes = [Text(f"Note: {note}") for note in _notes(study)]
     blocks = (*asked, *((sure,) if sure.items else ()), *notes)
-    return Section("details", "What was asked, and how sure this is", blocks) if blocks else None
+    return Section("details", "Question and confidence", blocks) if blocks else None
 
 
 def _question_facts(study: Study) -> Facts:
-    return Facts([("asked", text) for text in _asked(study)])
+    return Facts([("question", text) for text in _asked(study)])
 
 
 def verdict_of(study: Study) -> list[Block]:
@@ -110,7 +110,7 @@ def _question(part: Part) -> str:
     names = list(about.get("parameters", {}))
     search = f"differential evolution, {part.population} vectors, at most {part.generations} generations"
     if part.searches_locally:
-        search = "local searches from spread starts, differential evolution where they do not agree"
+        search = "local searches from several starts, differential evolution where they disagree"
     if part.kind == "identify":
         points = result.get("points", [])
         names = list(dict.fromkeys(n for p in points for n in p["parameters"])) or names
@@ -128,7 +128,7 @@ def _question(part: Part) -> str:
         return f"Find {listing(names)} of {fmu}{where}{data}; {search}."
     if part.kind == "diagnose":
         data = " with held-out recordings" if result.get("before", {}).get("validate") else ""
-        return f"Find out which physical effect {fmu} lacks to explain the recordings{data}."
+        return f"Find the physical effect that {fmu} lacks to explain the recordings{data}."
     if part.kind == "simulate":
         recordings = result.get("recordings", [])
         return f"Simulate {fmu} with {count(len(recordings), 'recording')} and compare." if recordings else ""
@@ -165,7 +165,7 @@ def _found_table(result: Json) -> Table:
     headings = [degrees(t) for t in next(iter(shared))] if len(shared) == 1 else ["coldest", "warmest"]
     columns = [Column("parameter", numeric=False), Column("unit", numeric=False), *map(Column, headings)]
     if laws:
-        columns += [Column("law", numeric=False), Column("points from published")]
+        columns += [Column("law", numeric=False), Column("deviation from published")]
     rows = []
     for name in names:
         row = [text_cell(name), text_cell(own[name][0]["parameters"][name]["unit"])]
@@ -182,7 +182,7 @@ def _found_table(result: Json) -> Table:
         if any(c.mark == "bad" for r in rows for c in r)
         else ""
     )
-    return Table("What came out: values ± one standard error", columns, rows, note)
+    return Table("Result: values ± one standard error", columns, rows, note)
 
 
 def _estimate(point: Json, name: str, with_place: bool) -> Cell:
@@ -245,7 +245,7 @@ def _tuned(result: Json) -> list[Block]:
             )
             for n in terms
         ]
-        blocks.append(Table("What came out", columns, rows))
+        blocks.append(Table("Result", columns, rows))
     return blocks
 
 
@@ -277,7 +277,7 @@ def _errors(study: Study) -> Table | None:
         Column("rmse / noise"),
         Column("rmse / range"),
     )
-    return Table("How well the recordings are met", columns, rows)
+    return Table("Errors by signal", columns, rows)
 
 
 def _sure(study: Study) -> list[str]:
@@ -300,9 +300,11 @@ def _sure(study: Study) -> list[str]:
         if worst <= MET:
             sentences.append(f"{what}: the model explains these recordings down to the noise.")
         elif worst <= MISSED:
-            sentences.append(f"{what}: a little is left that the model does not explain.")
+            sentences.append(f"{what}: the model leaves a small residual unexplained.")
         else:
-            sentences.append(f"{what}: the model lacks something, and the errors given are then too small.")
+            sentences.append(
+                f"{what}: the model does not explain the recordings, and the standard errors are too small."
+            )
     sentences += _agreement(result.get("points", []))
     groups = result.get("groups", [])
     if groups:

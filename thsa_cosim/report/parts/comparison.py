@@ -111,7 +111,7 @@ def _errors(recordings: list[Json]) -> Table:
                     Cell(percent(share), share),
                 )
             )
-    note = f"An rmse of 1 × noise is all that a model can reach; above {MISSED:g} × noise it lacks something."
+    note = f"1 × noise is the best that a model can reach; above {MISSED:g} × noise it does not explain the signal."
     return Table("Errors by recording and signal", columns, rows, note)
 
 
@@ -185,7 +185,7 @@ def compare_figure(name: str, found: SignalFile, errors: Json) -> Figure:
     samples = count(found.time.size, "sample")
     return drawn.build(
         f"{found.name}: measured and simulated, and simulated − measured below. {samples}; long signals are drawn by"
-        " the lowest and highest sample of each short span."
+        " the minimum and maximum of each short span."
     )
 
 

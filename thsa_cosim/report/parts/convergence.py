@@ -105,7 +105,7 @@ def _local_figure(part: Part, points: list[Json]) -> Figure:
             x_options={"rangemode": "tozero"},
         )
     return drawn.build(
-        "Cost (equation 6) per sample, 1 where only the noise is left, along local searches from different starts."
+        "Cost (equation 6) per sample, 1 = only noise is left, along local searches from different starts."
     )
 
 
@@ -133,9 +133,9 @@ def _figure(part: Part, found: list[Evolution], name: str) -> Figure:
             dtick_y=1 if _spans_decades(low, high) else None,
             x_options={"dtick": max(1, -(-len(generation) // 6)), "rangemode": "tozero"},
         )
-    what = "Cost (equation 7 with requirements; vectors that break a hard one are left out)"
+    what = "Cost (equation 7 with requirements; infeasible vectors are left out)"
     if part.kind != "tune":
-        what = "Cost (equation 6) per sample, 1 where only the noise is left; before the polish"
+        what = "Cost (equation 6) per sample, 1 = only noise is left; before the polish"
     return drawn.build(f"{what}, against generation, over the population of {part.population} vectors.")
 
 

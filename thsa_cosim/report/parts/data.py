@@ -6,9 +6,9 @@ from thsa_cosim.report.parts.text import text_cell
 
 _MARKS = {"error": "bad", "warning": "", "note": ""}
 _VERDICTS = {
-    "good": "Nothing was found in the recordings that a fit would suffer from.",
-    "usable": "The recordings have features that results may suffer from.",
-    "bad": "The recordings have defects that make results unsafe.",
+    "good": "The recordings have no defect that would affect a fit.",
+    "usable": "The recordings have defects that may affect the results.",
+    "bad": "The recordings have defects that make the results unreliable.",
 }
 
 
@@ -20,7 +20,7 @@ def data(part: Part) -> Section | None:
     found, trust = result["data"], result.get("trust", {"verdict": "explained", "reasons": []})
     blocks: list[Block] = []
     if trust["verdict"] == "not-explained":
-        blocks.append(Text("The fit is not explained: its values are not to be believed.", "bad"))
+        blocks.append(Text("The model does not explain the recordings: do not trust its values.", "bad"))
         blocks += [Text(f"– {reason}") for reason in trust["reasons"]]
     blocks.append(Text(_VERDICTS[found["verdict"]], "bad" if found["verdict"] == "bad" else ""))
     if found["findings"]:

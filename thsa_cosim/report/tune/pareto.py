@@ -1,4 +1,4 @@
-"""Two terms of a tuning that cannot both be least: what was tried, and what nothing beats."""
+"""The trade-off between two terms of a tuning: the gains that were tried, and the Pareto front."""
 
 from thsa_cosim.report.folder import Json, Part
 from thsa_cosim.report.parts import chart
@@ -11,7 +11,7 @@ from thsa_cosim.tune.problem import ALL
 
 
 def pareto(part: Part) -> Section | None:
-    """Two terms that cannot both be least; None where the scenario asks for none."""
+    """The trade-off between two terms; None where the scenario asks for none."""
     result = part.result or {}
     content: Json | None = result.get("pareto")
     if not content or not content["front"]:
@@ -25,16 +25,19 @@ def pareto(part: Part) -> Section | None:
         drawn.points(*tried, "tried and feasible", colour=chart.MEASURED, size=4, edge=0)
     front = sorted(content["front"], key=lambda row: float(row[x_name]))
     x, y = [row[x_name] for row in front], [row[y_name] for row in front]
-    drawn.points(x, y, "not dominated", joined=True, colour=chart.SIMULATED, size=7)
+    drawn.points(x, y, "Pareto front", joined=True, colour=chart.SIMULATED, size=7)
     drawn.axes(x=labels[0], y=labels[1])
     gain_units: Json = result.get("units", {})
     columns = [Column(term_label(n), units.get(n, "1")) for n in (x_name, y_name)]
     columns += [Column(n, u) for n, u in gain_units.items()]
     rows = [[number_cell(row[key]) for key in (x_name, y_name, *gain_units)] for row in front]
-    table = Table("Gains that nothing beats in both", columns, rows)
+    table = Table("Pareto-optimal gains", columns, rows)
     blocks: tuple[Block, ...] = (
-        drawn.build("Each point is one set of gains that keeps every hard requirement."),
-        Fold(f"The {len(rows)} sets of gains that nothing beats in both", (table,)),
+        drawn.build(
+            "Each point is one set of gains that meets every hard requirement. On the Pareto front neither term"
+            " can be improved without making the other one worse."
+        ),
+        Fold(f"{len(rows)} Pareto-optimal sets of gains", (table,)),
     )
     return Section(f"{part.prefix}pareto", "Trade-off", blocks)
 

@@ -30,7 +30,7 @@ def schedule(part: Part) -> Section | None:
     table = [[number_cell(row.get(key)) for key in (*axes, *gain_units)] for row in rows]
     blocks: list[Block] = [
         _figure(part, rows, axes, gain_units),
-        Table("Schedule: linear between nodes, held beyond the ends", columns, table),
+        Table("Schedule: linear between nodes, constant beyond the ends", columns, table),
     ]
     check: Json | None = result.get("schedule_check")
     if check:
@@ -75,7 +75,7 @@ def _figure(part: Part, rows: list[Json], axes: list[str], gain_units: Json) -> 
         drawn.axes(
             0, k, x=f"{label} [{unit}]", y=f"{name} [{gain_units[name]}]", y_options={"rangemode": "tozero"}
         )
-    return drawn.build("The gains over their first condition, beside what each node's own search found.")
+    return drawn.build("The gains over their first condition, and what the search of each node found.")
 
 
 def _check_figure(part: Part, result: Json, axis: str) -> Figure:
@@ -149,4 +149,4 @@ def _check_table(result: Json, check: Json) -> Table:
     ]
     rows += term_rows(result, {name: s["worst"] for name, s in sets.items()}, sets)
     title = f"The sweep between the nodes: worst of {count(check['conditions'], 'condition')}"
-    return Table(title, columns, rows, "Red: beyond the limit somewhere in the sweep.")
+    return Table(title, columns, rows, "Red: the limit is exceeded somewhere in the sweep.")

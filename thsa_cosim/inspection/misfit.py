@@ -269,7 +269,7 @@ def _settled_delay(rest: _Rest, best: _Slip) -> _Slip:
     def left(by: float) -> float:
         return rest.beside_late(_late(rest, which, by), which, by)
 
-    ends = sorted((0.5 * best.size, 2.0 * best.size))
+    ends = (min(0.5 * best.size, 2.0 * best.size), max(0.5 * best.size, 2.0 * best.size))
     found = minimize_scalar(left, bounds=ends, method="bounded", options={"maxiter": 20})
     return replace(best, size=float(found.x))
 

@@ -6,6 +6,7 @@ evaluated, its branch being taken, becomes an assertion that ends the run (Model
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -108,11 +109,8 @@ def _used(graph: Graph, targets: list[int], expressions: dict[int, ca.SX]) -> di
                 holds = expressions[condition] != 0
                 way = holds if way is None else ca.logic_and(way, holds)
             ways.append(way)
-        found[node] = None
-        if all(way is not None for way in ways):
-            found[node] = ways[0]
-            for way in ways[1:]:
-                found[node] = ca.logic_or(found[node], way)
+        sometimes = [way for way in ways if way is not None]
+        found[node] = functools.reduce(ca.logic_or, sometimes) if len(sometimes) == len(ways) else None
     return found
 
 

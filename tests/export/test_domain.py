@@ -61,6 +61,8 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
       Real unread = sqrt(x + a);
       Real guarded = if x > 0 then sqrt(x) else 0;
       Real both = if noEvent(x > 0) then log(x) else 1;
+      Real shared = if x > 0 then sqrt(x) else -sqrt(-x);
+      Real again = if noEvent(x > 0) then 2*sqrt(x) else -2*sqrt(-x);
       Real s(start = 0.5, fixed = true);
       Real v(start = 0.5, fixed = true);
       parameter Real start = 0.5;
@@ -96,7 +98,10 @@ def test_so_it_does_however_the_steps_are_chosen(fmu: Path, stepping: str) -> No
 @KINDS
 def test_branches_not_taken_are_not_watched_and_relations_slide(fmu: Path, kind: str) -> None:
     with Plant.open(fmu, kind=kind) as plant:
-        found = plant.run({}, None, ["guarded", "both", "s", "v"], T)
+        found = plant.run({}, None, ["guarded", "shared", "again", "s", "v"], T)
     np.testing.assert_allclose(found["guarded"], np.sqrt(np.maximum(0.5 - T, 0)), atol=1e-6)
+    root = np.sign(0.5 - T) * np.sqrt(np.abs(0.5 - T))
+    np.testing.assert_allclose(found["shared"], root, atol=1e-6)
+    np.testing.assert_allclose(found["again"], 2 * root, atol=1e-6)
     np.testing.assert_allclose(found["s"], np.maximum(0.5 - T, 0), atol=2e-3)
     np.testing.assert_allclose(found["v"], np.maximum(0, 1 - 0.5 * np.cos(T) - T), atol=2e-3)

@@ -6,6 +6,7 @@ evaluated, its branch being taken, becomes an assertion that ends the run (Model
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -59,15 +60,14 @@ def with_domains(model: CausalModel) -> CausalModel:
     if not calls:
         return model
     expressions = graph.expressions()
-    guard = graph.guards(targets, [], threshold=0)
+    used = _used(graph, targets, expressions)
     violated, texts = [], []
     for call in calls:
         name, fault, condition = _DOMAINS[graph.nodes[call].op or 0]
         arguments = [expressions[a] for a in graph.nodes[call].arguments]
-        condition_here = condition(*arguments)
-        for place in guard[call]:
-            if not _continues(graph, place, graph.nodes[call].arguments[0]):
-                condition_here = ca.logic_and(expressions[place] != 0, condition_here)
+        condition_here, when = condition(*arguments), used[call]
+        if when is not None:
+            condition_here = ca.logic_and(when, condition_here)
         shown = str(arguments[0])
         of = f"{name} of {shown}" if len(shown) <= _LONGEST and "@" not in shown else name
         violated.append(condition_here)
@@ -89,11 +89,37 @@ def continued(call: Callable[[ca.SX], ca.SX], argument: ca.SX) -> ca.SX:
     return ca.if_else(argument <= 0, 0, call(argument))
 
 
-def _continues(graph: Graph, place: int, argument: int) -> bool:
+def _used(graph: Graph, targets: list[int], expressions: dict[int, ca.SX]) -> dict[int, ca.SX | None]:
+    """For every node the condition under which a branch that is taken needs it; None for always."""
+    order = graph.needed(targets)
+    users = graph.users(order)
+    found: dict[int, ca.SX | None] = dict.fromkeys(targets)
+    for node in reversed(order):
+        if node in found:
+            continue
+        ways = []
+        for user in users[node]:
+            way, entry = found[user], graph.nodes[user]
+            condition = entry.arguments[0]
+            if (
+                entry.op == ca.OP_IF_ELSE_ZERO
+                and condition != node
+                and not _continues(graph, condition, node)
+            ):
+                holds = expressions[condition] != 0
+                way = holds if way is None else ca.logic_and(way, holds)
+            ways.append(way)
+        sometimes = [way for way in ways if way is not None]
+        found[node] = functools.reduce(ca.logic_or, sometimes) if len(sometimes) == len(ways) else None
+    return found
+
+
+def _continues(graph: Graph, condition: int, call: int) -> bool:
     """Whether a condition is the one of `continued`, which relations of a model never look like."""
-    node = graph.nodes[place]
-    if node.op != ca.OP_NOT:
+    node = graph.nodes[condition]
+    if node.op != ca.OP_NOT or graph.nodes[call].op not in _DOMAINS:
         return False
+    argument = graph.nodes[call].arguments[0]
     inner = graph.nodes[node.arguments[0]]
     return (
         inner.op == ca.OP_LE

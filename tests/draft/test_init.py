@@ -102,6 +102,23 @@ def test_what_fits_nowhere_is_listed_and_the_rest_still_loads(small: FmuDescript
     assert load_scenario(target).inputs == ("w_cmd", "T_amb")
 
 
+def test_a_unit_with_a_slash_is_the_unit_and_the_name_before_it_is_the_variable(
+    small: FmuDescription, tmp_path: Path
+) -> None:
+    file = csv(tmp_path / "run.csv", "time [s],w_cmd [rad/s],T_amb [degC],J1_w [rad/s],i_q [A]")
+    target = tmp_path / "scenario.toml"
+    draft = draft_scenario(small, [file], target)
+    columns = tomllib.loads(draft.text)["recordings"]["columns"]
+    assert columns["w_cmd"]["column"] == "w_cmd [rad/s]"
+    assert columns["i_q"]["column"] == "i_q [A]"
+    assert {n: c["unit"] for n, c in columns.items()}["w_cmd"] == "rad/s"
+    # Another name of a measured speed is either found for w_m, or said to be left.
+    left = {c.name: c.unit for c in draft.unmatched_columns}
+    assert columns.get("w_m", {}).get("column") == "J1_w [rad/s]" or left == {"J1_w [rad/s]": "rad/s"}
+    target.write_text(draft.text)
+    assert "w_cmd" in load_scenario(target).inputs
+
+
 def test_units_of_the_file_count_and_missing_ones_are_assumed(small: FmuDescription, tmp_path: Path) -> None:
     file = csv(tmp_path / "run.csv", "t,w_cmd,T_amb,w_m [rpm],i_q_mA")
     draft = draft_scenario(small, [file], tmp_path / "scenario.toml")

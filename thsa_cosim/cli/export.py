@@ -60,7 +60,10 @@ def export(
     from thsa_cosim.export import export_fmu, list_models
 
     if listing:
-        _list(list_models(library) for library in libraries or (package or modelica_package(),))
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            _list(list_models(library) for library in libraries or (package or modelica_package(),))
+        _note(said)
         return
     if model is None:
         raise click.UsageError(
@@ -83,9 +86,13 @@ def export(
             platforms=chosen,
             libraries=libraries,
         )
+    _note(said)
+    click.echo(str(path))
+
+
+def _note(said: list[warnings.WarningMessage]) -> None:
     for warning in said:
         click.echo(f"note: {warning.message}", err=True)
-    click.echo(str(path))
 
 
 def _list(found: Iterable[list[str]]) -> None:

@@ -7,6 +7,7 @@ import casadi as ca
 
 from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export.discrete import referenced, split_discrete
+from thsa_cosim.export.domain import with_domains
 from thsa_cosim.export.expression import Translator
 from thsa_cosim.export.solve import Block, EquationSystem
 from thsa_cosim.modelica.flat import Assertion, FlatEquation, FlatModel, FlatVariable
@@ -87,6 +88,8 @@ class CausalModel:
         default_factory=lambda: ca.SX(0, 1)
     )  # g at the guesses, where the initial values need modes
     assertions: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    domain: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # nonzero where a function leaves its domain
+    domain_texts: tuple[str, ...] = ()
 
     @property
     def y(self) -> ca.SX:
@@ -100,7 +103,7 @@ def make_causal(flat: FlatModel) -> CausalModel:
     Raises ModelicaError, naming the equation and the variable, for a singular system, a constraint that needs the
     derivative of an input, and an over-determined initialization.
     """
-    return _Builder(flat).build()
+    return with_domains(_Builder(flat).build())
 
 
 class _Builder:

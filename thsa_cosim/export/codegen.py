@@ -72,7 +72,8 @@ def config_header(model: CausalModel, model_identifier: str, token: str, toleran
         f"#define N_L {model.events.left}",
         f"#define N_T {model.events.samples.shape[0]}",
         f"#define N_R {int(model.events.reinit.numel() > 0)}",
-        f"#define N_A {model.assertions.numel()}",
+        f"#define N_A {model.assertions.numel() + model.domain.numel()}",
+        f"#define N_ENDS {model.domain.numel()}",
         f"#define N_GUESS {int(model.g_start.numel() > 0)}",
         f"#define N_IMPLICIT {model.y.numel()}",
         f"#define DEFAULT_TOLERANCE {tolerance!r}",
@@ -130,8 +131,8 @@ def model_source(model: CausalModel) -> ModelSource:
         rare["discrete"] = outputs(z=events.update)
     if events.reinit.numel():
         rare["reinit"] = outputs(x_new=events.reinit)
-    if model.assertions.numel():
-        rare["assertions"] = outputs(a=model.assertions)
+    if model.assertions.numel() + model.domain.numel():
+        rare["assertions"] = outputs(a=ca.vertcat(model.assertions, model.domain))
     alone = {"dependent": outputs(d=model.dependent), "initial": outputs(x=model.initial)}
     if implicit.size:
         alone["initial"] += [(f"v[{i}]", node) for i, node in enumerate(graph.add_column(model.y_start))]
@@ -298,8 +299,9 @@ def _tables(model: CausalModel) -> str:
         chosen = {v.index: v.start or 0.0 for v in model.variables if v.kind == kind}
         return numbers([chosen[index] for index in sorted(chosen)])
 
-    messages = ", ".join(_quoted(f"{a.message} ({_short(a.place)})") for a in model.flat.assertions)
-    asserted = [f"const char *const model_assertion_text[] = {{{messages}}};"] if messages else []
+    messages = [_quoted(f"{a.message} ({_short(a.place)})") for a in model.flat.assertions]
+    messages += [_quoted(text) for text in model.domain_texts]
+    asserted = [f"const char *const model_assertion_text[] = {{{', '.join(messages)}}};"] if messages else []
     nominals = [abs(state.nominal or 1.0) for state in states] or [1.0]
     tunable = ["1"] * model.p.numel() or ["0"]
     return "\n".join(

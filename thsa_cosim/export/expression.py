@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 
 from thsa_cosim.errors import ModelicaError
+from thsa_cosim.export.domain import continued
 from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, text
 
 _UNARY: dict[str, Callable[[ca.SX], ca.SX]] = {
@@ -27,7 +28,7 @@ _UNARY: dict[str, Callable[[ca.SX], ca.SX]] = {
     "exp": ca.exp,
     "log": ca.log,
     "log10": ca.log10,
-    "sqrt": ca.sqrt,
+    "sqrt": lambda a: continued(ca.sqrt, a),
     "neg": lambda a: -a,
     "not": ca.logic_not,
 }
@@ -52,6 +53,8 @@ def power(base: ca.SX, exponent: ca.SX) -> ca.SX:
         for _ in range(int(float(exponent)) - 1):
             result = result * base
         return result
+    if exponent.is_constant() and float(exponent) > 0 and float(exponent) % 1:
+        return continued(lambda b: b**exponent, base)
     return base**exponent
 
 

@@ -43,12 +43,19 @@ def locate(model: str, package: Path, libraries: Sequence[Path] = ()) -> tuple[P
 
 
 def list_models(library: Path, search: Sequence[Path] = ()) -> list[str]:
-    """Names of all models and blocks of a library that are not partial; raises ModelicaError if it is none."""
+    """Names of all models and blocks of a library that are not partial; raises ModelicaError if it is none.
+
+    Warns of files that cannot be read.
+    """
     _check(library)
     found = Library([library, *search])
     names: list[str] = []
     for top in Library([library]).names():
-        definition = found.top(top)
+        try:
+            definition = found.top(top)
+        except ModelicaError as error:
+            warnings.warn(str(error), stacklevel=2)
+            continue
         if definition is not None:
             names += _models(found, definition, top)
     return names
@@ -58,7 +65,11 @@ def _models(library: Library, definition: ClassDefinition, name: str) -> Iterato
     if definition.kind in ("model", "block") and "partial" not in definition.prefixes:
         yield name
     for child in library.children(definition):
-        nested = library.nested(definition, child)
+        try:
+            nested = library.nested(definition, child)
+        except ModelicaError as error:
+            warnings.warn(str(error), stacklevel=2)
+            continue
         if nested is not None:
             yield from _models(library, nested, f"{name}.{child}")
 

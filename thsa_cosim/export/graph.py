@@ -73,6 +73,10 @@ class Graph:
             self._by_element[top.element_hash()] = self._intern(top)
         return self._by_element[expression.element_hash()]
 
+    def expressions(self) -> dict[int, ca.SX]:
+        """An expression for every node that was made from one."""
+        return {self._by_element[e.element_hash()]: e for e in reversed(self._kept)}
+
     def _intern(self, expression: ca.SX) -> int:
         if expression.is_constant():
             node = Node(None, constant=float(expression))

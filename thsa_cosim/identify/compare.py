@@ -1,6 +1,7 @@
 """Simulated against measured: per recording and channel, and over all recordings of a role."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from thsa_cosim.identify.problem import Case
 from thsa_cosim.identify.results import ChannelError, Comparison
 from thsa_cosim.inspection import Residual
 from thsa_cosim.recordings import Recording
-from thsa_cosim.signals import Signals
+from thsa_cosim.signals import FloatArray, Signals
 
 
 def compare(case: Case, recording: Recording, role: str, simulated: Signals) -> Comparison:
@@ -37,21 +38,35 @@ def compare(case: Case, recording: Recording, role: str, simulated: Signals) -> 
     )
 
 
-def case_residuals(case: Case, simulated: Signals) -> list[Residual]:
-    """What a simulation leaves of each fitted signal, where it counts, with the inputs at the same samples."""
+def case_residuals(
+    case: Case, simulated: Signals, slopes: Sequence[FloatArray | None] = ()
+) -> list[Residual]:
+    """What a simulation leaves of each fitted signal, where it counts, with the inputs at the same samples.
+
+    ``slopes``: per channel the rows (n, p) of the Jacobian of its weighted residual; without, no slip is looked for.
+    """
     found = []
-    for channel in case.channels:
+    for k, channel in enumerate(case.channels):
         inputs = case.inputs.resample(channel.time)
+        values = channel.residual(simulated) / np.sqrt(channel.weight)
+        own = slopes[k] if k < len(slopes) else None
         found.append(
             Residual(
                 recording=case.name,
                 channel=channel.name,
-                values=channel.residual(simulated) / np.sqrt(channel.weight),
+                values=values,
                 noise=channel.noise,
                 unit=case.measured.units.get(channel.name, "1"),
                 inputs={name: inputs[name] for name in inputs.names},
             )
         )
+        if own is not None:
+            found[-1] = replace(
+                found[-1],
+                time=channel.time,
+                simulated=channel.measured + values * channel.noise,
+                slopes=own / np.sqrt(channel.weight),
+            )
     return found
 
 

@@ -1,7 +1,7 @@
 """The search at one point: local searches, evolution, polish, uncertainty. In a thread of its own, it only asks."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,11 +44,15 @@ CLEAR_OF_ZERO = 3.0
 
 @dataclass(frozen=True, eq=False)
 class PointSearch:
-    """A point's result with the signals of its recordings at the estimate; None when nothing ran."""
+    """A point's result with the signals of its recordings at the estimate; None when nothing ran.
+
+    ``jacobian``: of the stacked residuals (N, p) at the estimate, if there was a polish.
+    """
 
     result: PointResult | None
     signals: tuple[Signals, ...]
     reason: str
+    jacobian: FloatArray | None = None
 
 
 class _HopelessError(Exception):
@@ -91,6 +95,7 @@ def search_point(
     best, polished = found.best, ""
     profiles: dict[str, ProfileCurve] = {}
     uncertainty: Uncertainty | None = None
+    jacobian: FloatArray | None = None
     if polishing:
         settled = PolishSettings(error=point.error)
         residuals = _residuals(ask)
@@ -100,7 +105,7 @@ def search_point(
             sure = answer(confirm(found.minimum, settled), residuals)
         polished = sure.reason
         if sure.residual is not None and sure.jacobian is not None and sure.jacobian_error is not None:
-            best = sure.best
+            best, jacobian = sure.best, sure.jacobian
             uncertainty = estimate_uncertainty(
                 best,
                 sure.residual,
@@ -114,7 +119,7 @@ def search_point(
                 shifts = _given_jacobian(point.given, best, sure.residual, ask)
                 uncertainty = with_given(uncertainty, sure.jacobian, shifts, point.given.covariance)
             profiles = _profiles(point, best, sure.jacobian, uncertainty, ask)
-    return _result(point, found, best, polished, uncertainty, profiles, ask)
+    return replace(_result(point, found, best, polished, uncertainty, profiles, ask), jacobian=jacobian)
 
 
 def _residuals(ask: Ask) -> Residuals:

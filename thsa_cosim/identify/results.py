@@ -26,6 +26,16 @@ class Estimate:
     lower: float
     upper: float
 
+    @property
+    def on_bound(self) -> str:
+        """``"lower"`` or ``"upper"`` where the value lies on that bound, else ""; a bound of 0 is a value as any."""
+        near = 1e-6 * (self.upper - self.lower)
+        if self.lower != 0.0 and self.value <= self.lower + min(near, 1e-3 * abs(self.lower)):
+            return "lower"
+        if self.upper != 0.0 and self.value >= self.upper - min(near, 1e-3 * abs(self.upper)):
+            return "upper"
+        return ""
+
 
 @dataclass(frozen=True, eq=False)
 class ProfileCurve:

@@ -24,7 +24,7 @@ from thsa_cosim.identify.results import (
     PointResult,
 )
 from thsa_cosim.identify.silent import note_on, silent_parameters
-from thsa_cosim.inspection import Residual, judge
+from thsa_cosim.inspection import Finding, Inspection, Residual, judge, misfits
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario
 from thsa_cosim.search import EvolutionSettings, Generation
@@ -185,6 +185,7 @@ class _Search:
             if found.result is None
         ]
         force, unsaid = self._force(comparisons, laws)
+        slips = self._slips()
         return IdentifyResult(
             title=title,
             status="interrupted" if self.interrupted else "complete",
@@ -204,17 +205,36 @@ class _Search:
             notes=(*scenario.notes, *failed, *notes, *left_out, *self._notes, *unsaid),
             settings={**scenario.search.model_dump(), "error": scenario.cost.error},
             force=force,
-            data=scenario.data,
-            trust=judge(self._residuals()),
+            data=Inspection.of((*scenario.data.findings, *slips), scenario.data.repairs),
+            trust=judge(self._residuals(), (*map(_reason, slips), *self._bounds())),
         )
 
     def _residuals(self) -> list[Residual]:
         """What the fit leaves of every fitted signal, where it counts."""
+        return [residual for k in sorted(self._found) for residual in self._point_residuals(k)]
+
+    def _point_residuals(self, index: int) -> list[Residual]:
+        point, search = self._points[index], self._found[index]
         found = []
-        for k, search in sorted(self._found.items()):
-            for case, simulated in zip(self._points[k].cases, search.signals, strict=False):
-                found += case_residuals(case, simulated)
+        for case, simulated, rows in zip(point.cases, search.signals, point.groups, strict=False):
+            slopes = [None if search.jacobian is None else search.jacobian[own] for own in rows]
+            found += case_residuals(case, simulated, slopes)
         return found
+
+    def _slips(self) -> list[Finding]:
+        """What one slip of one signal would explain of what the fit leaves, beyond what is known of the data."""
+        known = {(f.recording, f.channel, f.kind) for f in self._scenario.data.findings}
+        found = [f for k in sorted(self._found) for f in misfits(self._point_residuals(k))]
+        return [f for f in found if (f.recording, f.channel, f.kind) not in known]
+
+    def _bounds(self) -> list[str]:
+        """Parameters that ended on a bound: the fit would have gone on."""
+        return [
+            f"{name} lies on its {side} bound at {point.label}: the fit would have gone on"
+            for point in self._results()
+            for name, estimate in point.parameters.items()
+            if (side := estimate.on_bound)
+        ]
 
     def _force(
         self, comparisons: Sequence[Comparison], laws: Mapping[str, LawResult]
@@ -253,6 +273,10 @@ class _Search:
             for case, recording, signals in zip(problem.cases, recordings, found.signals, strict=False):
                 comparisons.append(compare(case, recording, "fit", signals))
         return comparisons
+
+
+def _reason(finding: Finding) -> str:
+    return f"{finding.recording}: {finding.text} ({finding.kind})"
 
 
 def _held_out_cases(scenario: Scenario) -> list[tuple[Case, Recording]]:

@@ -62,10 +62,10 @@ def across_findings(channels: Sequence[Channel]) -> Iterator[Finding]:
                 yield from _derivative(position, speed)
 
 
-def slip(factor: float) -> str | None:
-    """Return which slip of units multiplies numbers by ``factor``; None if none does."""
+def slip(factor: float, near: float = _NEAR) -> str | None:
+    """Return which slip of units multiplies numbers by ``factor``, to a share of ``near``; None if none does."""
     for name, value in SLIPS.items():
-        if abs(factor / value - 1.0) < _NEAR:
+        if abs(factor / value - 1.0) < near:
             return name
     return None
 

@@ -30,6 +30,7 @@ class Channel:
     """``values`` (n,) in ``unit`` at ``time`` (n,) s, as measured: nothing smoothed, shifted or resampled.
 
     ``held``: the scenario says that the value stays until the next sample. ``averaged``: only its mean is used.
+    ``written`` (n,): the numbers of the file, which a scenario's ``missing`` names; None: ``values``.
     """
 
     recording: str
@@ -40,6 +41,7 @@ class Channel:
     values: FloatArray
     held: bool = False
     averaged: bool = False
+    written: FloatArray | None = None
 
     @cached_property
     def step(self) -> float:

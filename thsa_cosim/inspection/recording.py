@@ -77,6 +77,7 @@ def _channel(recording: Recording, name: str, driven: bool) -> Channel:
         values=samples.values[kept],
         held=samples.held,
         averaged=samples.averaged,
+        written=None if samples.written is None else samples.written[kept],
     )
 
 

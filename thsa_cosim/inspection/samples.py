@@ -52,7 +52,8 @@ def sentinels(channel: Channel) -> Iterator[Finding]:
     """Codes for a missing value."""
     if not channel.coded.any():
         return
-    codes = np.unique(channel.values[channel.coded])
+    written = channel.values if channel.written is None else channel.written
+    codes = np.unique(written[channel.coded])
     count = int(np.sum(channel.coded))
     shown = ", ".join(f"{code:.6g}" for code in codes[:4])
     part, plural = share(count / channel.values.size), "s" if count > 1 else ""

@@ -13,6 +13,8 @@ _JITTER_NOTE, _JITTER = 0.02, 0.1
 _GAP = 10
 """Steps without a sample that make a gap; fewer are lost samples."""
 _FEW, _TOO_FEW = 200, 40
+_CATCH_UP = 0.5
+"""s after a gap in which the model may still be elsewhere: its inputs are not known within."""
 _MOST_SPANS = 40
 
 Found = Callable[..., Finding]
@@ -21,8 +23,10 @@ Found = Callable[..., Finding]
 def time_findings(recording: str, time: FloatArray) -> Iterator[Finding]:
     """Yield what is wrong with the stamps ``time`` (n,) in s, in the file's order."""
 
-    def found(kind: str, severity: Severity, text: str, where: tuple[Span, ...] = ()) -> Finding:
-        return Finding(recording, "time", kind, severity, text, where)
+    def found(
+        kind: str, severity: Severity, text: str, where: tuple[Span, ...] = (), remedy: str = ""
+    ) -> Finding:
+        return Finding(recording, "time", kind, severity, text, where, remedy)
 
     if time.size < _FEW:
         severity: Severity = "error" if time.size < _TOO_FEW else "warning"
@@ -92,7 +96,9 @@ def _missing(found: Found, time: FloatArray, missing: FloatArray) -> Iterator[Fi
     if gaps.any():
         longest = float(np.max(np.diff(time)[gaps]))
         text = f"{np.sum(gaps)} gap{'s' if np.sum(gaps) > 1 else ''} without samples, the longest of {longest:.4g} s"
-        yield found("gaps", "warning", text, _spans(time, gaps))
+        spans = _spans(time, gaps)
+        pairs = ", ".join(f"[{a - time[0]:.6g}, {b - time[0] + _CATCH_UP:.6g}]" for a, b in spans)
+        yield found("gaps", "warning", text, spans, f"[cost]\nmask = [{pairs}]")
     scattered = float(np.sum(missing[~gaps]))
     if scattered:
         part = scattered / (scattered + time.size)

@@ -28,7 +28,8 @@ _MOST_REASONS = 12
 class Residual:
     """What is left of ``channel`` in one recording: simulated less measured over noise, (n,), dimensionless.
 
-    ``inputs``: by name, (n,) at the same samples. ``noise``: 1 σ in ``unit``.
+    ``inputs``: by name, (n,) at the same samples. ``noise``: 1 σ in ``unit``. For ``misfits`` also ``time`` (n,) s,
+    ``simulated`` (n,) in ``unit``, and ``slopes`` (n, p): how the values follow each parameter, in any scale.
     """
 
     recording: str
@@ -37,6 +38,9 @@ class Residual:
     noise: float
     unit: str
     inputs: Mapping[str, FloatArray] = field(default_factory=dict)
+    time: FloatArray = field(default_factory=lambda: np.empty(0))
+    simulated: FloatArray = field(default_factory=lambda: np.empty(0))
+    slopes: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
 
 @dataclass(frozen=True)
@@ -51,9 +55,12 @@ class Trust:
         return {"verdict": self.verdict, "reasons": list(self.reasons)}
 
 
-def judge(residuals: Sequence[Residual]) -> Trust:
-    """Return whether ``residuals`` are noise, channel by channel over all recordings, then recording by recording."""
-    reasons: list[str] = []
+def judge(residuals: Sequence[Residual], known: Sequence[str] = ()) -> Trust:
+    """Return whether ``residuals`` are noise, channel by channel over all recordings, then recording by recording.
+
+    ``known``: reasons against it that are known already.
+    """
+    reasons: list[str] = list(known)
     for channel in dict.fromkeys(r.channel for r in residuals):
         own = [r for r in residuals if r.channel == channel and r.values.size]
         reasons += _channel(channel, own)

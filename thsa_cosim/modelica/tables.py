@@ -121,41 +121,45 @@ def interpolate(
     """y(u) through the points; two points of one x are a jump."""
     if table.extrapolation == PERIODIC:
         raise evaluator.error(where, "a table that repeats periodically is a limit of this exporter.")
+    if table.extrapolation == NONE:
+        raise evaluator.error(
+            where, "a table without extrapolation is a limit of this exporter; choose HoldLastPoint."
+        )
     if table.smoothness not in (LINEAR, AKIMA, CONSTANT):
         raise evaluator.error(where, "a table with monotone splines is a limit of this exporter.")
-    if any(b < a for a, b in pairwise(x)):
+    if any(b < a or (b == a and table.smoothness == AKIMA) for a, b in pairwise(x)):
         raise evaluator.error(where, "the first column of the table has to rise.")
     if len(x) == 1:
         return y[0]
-    pieces = _pieces(table.smoothness, x, y, u)
-    hold = table.extrapolation == HOLD
+    slopes = [
+        make("/", make("-", y[k + 1], y[k]), x[k + 1] - x[k]) if x[k + 1] > x[k] else 0.0
+        for k in range(len(x) - 1)
+    ]
+    rates = _akima(slopes) if table.smoothness == AKIMA and len(x) > 2 else None
+    pieces = list(y[:-1]) if table.smoothness == CONSTANT else _pieces(x, y, u, slopes, rates)
 
     def below(limit: float) -> Scalar:
         relation = make("<", u, limit)
         return relation if events else make("noEvent", relation)
 
-    result = pieces[-1]
-    if table.smoothness == CONSTANT or hold:
-        result = make("if", below(x[-1]), result, y[-1]) if table.smoothness != CONSTANT else y[-1]
-        if table.smoothness == CONSTANT:
-            result = make("if", below(x[-1]), pieces[-1], y[-1])
-    for k in range(len(pieces) - 1, 0, -1):
+    def beyond(end: int) -> Scalar:
+        """The value outside, at the first (0) or last (-1) point and on."""
+        if table.extrapolation == HOLD or table.smoothness == CONSTANT:
+            return y[end]
+        slope = slopes[end] if rates is None else rates[end]
+        return make("+", y[end], make("*", slope, make("-", u, x[end])))
+
+    result = beyond(-1)
+    for k in range(len(pieces), 0, -1):
         if x[k] > x[k - 1]:
             result = make("if", below(x[k]), pieces[k - 1], result)
-    if hold:
-        result = make("if", below(x[0]), y[0], result)
-    return result
+    return make("if", below(x[0]), beyond(0), result)
 
 
-def _pieces(smoothness: int, x: list[float], y: list[Scalar], u: Scalar) -> list[Scalar]:
-    """A value for every interval of x."""
-    slopes = [
-        make("/", make("-", y[k + 1], y[k]), x[k + 1] - x[k]) if x[k + 1] > x[k] else 0.0
-        for k in range(len(x) - 1)
-    ]
-    if smoothness == CONSTANT:
-        return list(y[:-1])
-    rates = _akima(slopes) if smoothness == AKIMA and len(x) > 2 else None
+def _pieces(
+    x: list[float], y: list[Scalar], u: Scalar, slopes: list[Scalar], rates: list[float] | None
+) -> list[Scalar]:
+    """A value for every interval of x: linear, or cubic with the rates at the points."""
     found = []
     for k, slope in enumerate(slopes):
         distance = make("-", u, x[k])

@@ -85,7 +85,7 @@ class Samples:
     """A signal as the file holds it within the cut, in the FMU variable's unit: nothing smoothed, shifted, resampled.
 
     ``time``, ``values``: (n,); ``left_out`` (n,): what the scenario's repairs leave out. ``held``: by
-    ``interpolation = "hold"``; ``averaged``: by ``smooth = "mean"``.
+    ``interpolation = "hold"``; ``averaged``: by ``smooth = "mean"``. ``written`` (n,): the file's own numbers.
     """
 
     time: FloatArray
@@ -94,6 +94,7 @@ class Samples:
     left_out: Mask
     held: bool = False
     averaged: bool = False
+    written: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +242,13 @@ def read_recording(
         unit = targets.get(signal) or source.unit or column.unit or "1"
         held_here = source.interpolation == "hold"
         samples[signal] = Samples(
-            t[kept], measured, unit, mended.left_out, held_here, source.smooth == "mean"
+            t[kept],
+            measured,
+            unit,
+            mended.left_out,
+            held_here,
+            source.smooth == "mean",
+            column.values[kept],
         )
         repairs += mended.done
         if mended.left_out.any():

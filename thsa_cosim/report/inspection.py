@@ -45,12 +45,22 @@ def print_inspection(
 
 
 def _merged(remedies: Sequence[str]) -> list[str]:
-    """One table per heading, with the keys of all remedies below it."""
-    tables: dict[str, dict[str, None]] = {}
+    """One table per heading, with the keys of all remedies below it; lists of one key are one list."""
+    tables: dict[str, dict[str, str]] = {}
     for remedy in remedies:
-        heading, _, keys = remedy.partition("\n")
-        tables.setdefault(heading, {}).update(dict.fromkeys(keys.splitlines()))
-    return ["\n".join((heading, *keys)) for heading, keys in tables.items()]
+        heading, _, lines = remedy.partition("\n")
+        table = tables.setdefault(heading, {})
+        for line in lines.splitlines():
+            key, _, value = line.partition(" = ")
+            known = table.get(key)
+            if known is not None and known != value and known.startswith("["):
+                table[key] = f"{known[:-1]}, {value[1:]}"
+            else:
+                table.setdefault(key, value)
+    return [
+        "\n".join((heading, *(f"{key} = {value}" for key, value in table.items())))
+        for heading, table in tables.items()
+    ]
 
 
 def _line(finding: Finding) -> Text:

@@ -13,6 +13,7 @@
 #include <float.h>
 #include <math.h>
 #include <string.h>
+#include "discrete.h"
 #include "solver.h"
 
 #if N_X > 0
@@ -188,6 +189,7 @@ Status solver_advance(Instance *c, double end) {
         const double remaining = end - now->time, grain = time_grain(c, end);
         int landing = 0, was_rejected = 0, last;
         double h, error, accepted = restarted ? CAREFUL : 1.0;
+        if (N_ENDS && discrete_domain(c, now->time, now->x, now->u) != OK) return DISCARD;
         if (solver_linearize(c)) return give_up(c, "derivatives or Jacobian cannot be computed");
         if (!(now->step > 0.0)) now->step = first_step(c, remaining);
         h = 1.25 * now->step >= remaining ? remaining : now->step > 0.5 * remaining ? 0.5 * remaining : now->step;

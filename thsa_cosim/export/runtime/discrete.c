@@ -192,6 +192,11 @@ double discrete_next(const Instance *c) {
     return DBL_MAX;
 }
 
+Status discrete_update(Instance *c) {
+    (void)c;
+    return OK;
+}
+
 #endif
 
 Status discrete_advance(Instance *c, double end) {
@@ -205,21 +210,34 @@ Status discrete_advance(Instance *c, double end) {
     return OK;
 }
 
+Status discrete_domain(Instance *c, double time, const double *x, const double *u) {
+#if N_ENDS
+    const State *s = &c->s;
+    double violated[N_A];
+    if (model_assertions(time, x, u, s->p, s->d, s->now.m, violated)) return OK;
+    for (int k = N_A - N_ENDS; k < N_A; k++) {
+        if (!(violated[k] != 0.0)) continue;
+        instance_log(c, DISCARD, LOG_DISCARD, "at time %.15g: %s", time, model_assertion_text[k]);
+        return DISCARD;
+    }
+#else
+    (void)c, (void)time, (void)x, (void)u;
+#endif
+    return OK;
+}
+
 Status discrete_assertions(Instance *c) {
+    Status status = OK;
 #if N_A
     const State *s = &c->s;
     double violated[N_A];
-    Status status = OK;
     if (model_assertions(POINT, violated)) return OK;
-    for (int k = 0; k < N_A; k++) {
+    for (int k = 0; k < N_A - N_ENDS; k++) {
         if (!(violated[k] != 0.0) || c->asserted[k]) continue;
         c->asserted[k] = 1;
         status = WARNING;
         instance_warn(c, "at time %.15g: %s", s->now.time, model_assertion_text[k]);
     }
-    return status;
-#else
-    (void)c;
-    return OK;
 #endif
+    return discrete_domain(c, c->s.now.time, c->s.now.x, c->s.now.u) == OK ? status : DISCARD;
 }

@@ -10,6 +10,8 @@ Status discrete_started(Instance *c);               /* ends the initialization; 
 void discrete_reset(Instance *c);                   /* m before the initialization */
 double discrete_next(const Instance *c);            /* time of the next time event, DBL_MAX = none */
 Status discrete_advance(Instance *c, double end);   /* solver_advance with time events on the way */
-Status discrete_assertions(Instance *c);            /* WARNING and a message where one fails for the first time */
+Status discrete_assertions(Instance *c);            /* WARNING and a message where one fails for the first time, or: */
+/* DISCARD and a message where one fails that ends the run. */
+Status discrete_domain(Instance *c, double time, const double *x, const double *u);
 
 #endif

@@ -131,16 +131,27 @@ double instance_dead_band(const Instance *c, int k) {
 }
 
 /* A relation that each branch drives back (sliding along g = 0) changes for ever at the pace of rounding noise. Its dead
- * band grows until it changes at a pace that can be integrated, to a thousandth of the largest |g| at most. The
- * Co-Simulation crosses such bursts itself (advance.c). */
+ * band grows until it changes at a pace that can be integrated, to a thousandth of the largest |g| at most; where
+ * that is not enough to get on, the run ends. The Co-Simulation crosses such bursts itself (advance.c). */
 static void widen(Instance *c, int k) {
-    enum { PATIENCE = 12 };
+    enum { PATIENCE = 12, MOST_CAUGHT = 5000 };
     Motion *now = &c->s.now;
     const double band = instance_dead_band(c, k);
     if (c->kind != MODEL_EXCHANGE) return;
     now->returns[k] = now->reach[k] < 20.0 * band ? now->returns[k] + 1 : 0;
     now->reach[k] = 0.0;
-    if (now->returns[k] < PATIENCE || band >= 1e-3 * now->span[k]) return;
+    if (now->returns[k] < PATIENCE) {
+        now->caught[k] = 0;
+        return;
+    }
+    if (band >= 1e-3 * now->span[k]) {
+        const double whole = c->s.stop_defined ? c->s.stop_time - c->s.start_time : 1.0;
+        if (now->caught[k]++ == 0) now->since[k] = now->time;
+        if (now->caught[k] < MOST_CAUGHT) return;
+        if (now->time - now->since[k] < 1e-3 * whole) now->endless = k + 1;
+        now->caught[k] = 0;
+        return;
+    }
     if (now->band[k] == 0.0)
         instance_warn(c, "relation %d changes without end from time %.15g on: it gets a dead band", k, now->time);
     now->band[k] = fmin(4.0 * band, 1e-3 * now->span[k]);
@@ -162,13 +173,13 @@ static Status update_dependent(Instance *c) {
     return OK;
 }
 
-/* m := (g > 0) where g has left the dead band on the other side; returns the number of relations that changed. */
+/* m := (g > 0) where g has come to the far side of the dead band, so that no indicator is 0 afterwards; returns the number of relations that changed. */
 int instance_switch_modes(Instance *c, int report) {
     Motion *now = &c->s.now;
     int changed = 0;
     for (int k = 0; k < N_G; k++) {
         const double band = instance_dead_band(c, k);
-        const double wanted = c->g[k] > band ? 1.0 : c->g[k] < -band || c->g[k] == 0.0 ? 0.0 : now->m[k];
+        const double wanted = c->g[k] >= band ? 1.0 : c->g[k] <= -band || c->g[k] == 0.0 ? 0.0 : now->m[k];
         now->span[k] = fmax(now->span[k], fabs(c->g[k]));
         if (wanted == now->m[k]) continue;
         now->m[k] = wanted;
@@ -182,20 +193,23 @@ int instance_switch_modes(Instance *c, int report) {
     return changed;
 }
 
-Status instance_update_modes(Instance *c) {
-    if (update_dependent(c) != OK) return DISCARD;
-    c->s.modes_due = 0;
-#if N_EVENTS
-    c->events++;
-    return discrete_update(c);
-#endif
-    if (!N_G) return OK;
-    for (int i = 0; i < MOST_ITERATIONS; i++) {
+static Status settle_relations(Instance *c) {
+    for (int i = 0; N_G && i < MOST_ITERATIONS; i++) {
         if (instance_indicators(c) != OK) return DISCARD;
         if (!instance_switch_modes(c, 1)) return OK;
         c->events++;
     }
-    return fail(c, DISCARD, "the event iteration does not settle");
+    return N_G ? fail(c, DISCARD, "the event iteration does not settle") : OK;
+}
+
+Status instance_update_modes(Instance *c) {
+    if (update_dependent(c) != OK) return DISCARD;
+    c->s.modes_due = 0;
+    c->events += N_EVENTS;
+    const Status status = N_EVENTS ? discrete_update(c) : settle_relations(c);
+    if (status != OK || !c->s.now.endless) return status;
+    c->s.now.endless = 0;
+    return fail(c, DISCARD, "a relation changes without end, faster than the run gets on,");
 }
 
 static Status not_initialized(Instance *c, const char *why) {
@@ -213,6 +227,8 @@ Status instance_initialize(Instance *c) {
     memset(s->now.span, 0, sizeof s->now.span);
     memset(s->now.band, 0, sizeof s->now.band);
     memset(s->now.returns, 0, sizeof s->now.returns);
+    memset(s->now.caught, 0, sizeof s->now.caught);
+    s->now.endless = 0;
 #if N_EVENTS
     discrete_reset(c);
 #endif
@@ -273,7 +289,10 @@ Status instance_missed_event(Instance *c, int *missed) {
     *missed = 0;
     if (instance_indicators(c) != OK) return DISCARD;
     for (int k = 0; k < N_G; k++) c->s.now.reach[k] = fmax(c->s.now.reach[k], fabs(c->g[k]));
-    for (int k = 0; k < N_G; k++) *missed |= (instance_indicator(c, k) > 0.0) != (c->s.now.m[k] > 0.5);
+    for (int k = 0; k < N_G; k++) {
+        const double indicator = instance_indicator(c, k);
+        *missed |= c->s.now.m[k] > 0.5 ? indicator <= 0.0 : indicator >= 0.0;
+    }
     return OK;
 }
 
@@ -442,9 +461,9 @@ Status instance_do_step(Instance *c, double from, double size) {
         c->jacobian_valid = 0;
     }
     if (instance_settle(c) != OK) return DISCARD;
+    const Motion before = s->now;
     if (end > s->now.time) {
         s->derivatives_used = 1;
-        const Motion before = s->now;
         s->phase = IN_STEP;
         c->return_early = 0;
         const Status status = discrete_advance(c, end);
@@ -455,6 +474,12 @@ Status instance_do_step(Instance *c, double from, double size) {
             return status;
         }
     }
+    const Status asserted = discrete_assertions(c);
+    if (asserted == DISCARD) {
+        s->now = before;
+        instance_changed(c);
+        return asserted;
+    }
     s->last_step_end = s->now.time;
-    return discrete_assertions(c);
+    return asserted;
 }

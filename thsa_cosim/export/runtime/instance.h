@@ -35,6 +35,9 @@ typedef struct {
     double reach[N_G + 1];   /* largest |g| since the relation changed (Model Exchange) */
     double band[N_G + 1];    /* dead band of a relation that chatters, else 0 */
     int returns[N_G + 1];    /* times in a row that it changed back before g had left the band */
+    int caught[N_G + 1];     /* the same with the widest band, since the time that follows */
+    double since[N_G + 1];
+    int endless;             /* 1 + the relation that changes too often to go on, else 0 */
 } Motion;
 
 typedef struct {

@@ -22,6 +22,7 @@
 #define N_T 0 /* samples */
 #define N_R 0 /* 1: states are reinitialized */
 #define N_A 0 /* assertions */
+#define N_ENDS 0 /* those of them, the last ones, that end a run */
 #define N_GUESS 0 /* 1: the initial values depend on relations */
 #define N_IMPLICIT 0 /* unknowns of implicit equations, kept at the end of the cache */
 #endif

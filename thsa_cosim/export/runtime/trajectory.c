@@ -48,6 +48,10 @@ static Status write_row(Instance *c, Recorder *r) {
     Trajectory *run = r->run;
     double *to = run->results + run->done, finite = 0.0;
     int failed = 0;
+    if (N_ENDS && discrete_domain(c, r->time, r->x, r->u) != OK) {
+        run->reached = r->time;
+        return DISCARD;
+    }
     if (r->algebraic) failed = model_algebraic(r->time, r->x, r->u, s->p, s->d, s->now.m, r->w);
     else if (r->outputs) failed = model_outputs(r->time, r->x, r->u, s->p, s->d, s->now.m, r->w);
     if (r->derivatives) failed |= model_rhs(r->time, r->x, r->u, s->p, s->d, s->now.m, r->dx);
@@ -188,6 +192,7 @@ static Status follow(Instance *c, Recorder *r) {
         if (end > c->s.now.time) status = cross(c, end);
     }
     if (status == OK && run->done < run->n_times) status = write_here(c, r);
+    if (status == OK && N_ENDS) status = discrete_domain(c, c->s.now.time, c->s.now.x, c->s.now.u);
     return status;
 }
 

@@ -65,7 +65,7 @@ HELD = np.zeros(SAMPLES)
 def test_a_fit_down_to_the_noise_is_polished_once_from_where_it_is(fits: Any):
     choice, current = scored(fit(2.0, 3.0, 300.0)), fit(1.0, 9.0, 900.0)
     bench: Any = object()
-    fits.queue = [fit(2.1, ENOUGH, 100.0)]
+    fits.queue = [fit(2.1, 0.999 * ENOUGH, 100.0)]
     found = polish(bench, choice, current, HELD)
     assert found.fit.vector[0] == 2.1
     assert found.proposal is choice.proposal

@@ -121,10 +121,11 @@ def block_squares(trials: Sequence[Trial], residual: FloatArray, seconds: float 
     recordings are cut into no fewer than ``FEWEST``.
     """
     spans = [(min(c.time[0] for c in own), max(c.time[-1] for c in own)) for own in _channels(trials)]
-    seconds = min(seconds, sum(float(end - begin) for begin, end in spans) / FEWEST)
+    whole = sum(float(end - begin) for begin, end in spans)
+    blocks = max(FEWEST, math.ceil(round(whole / seconds, 6)))
     sums: list[FloatArray] = []
     for trial, (begin, end), squares in zip(trials, spans, per_trial(trials, residual**2), strict=True):
-        count = max(1, math.ceil(round(float(end - begin) / seconds, 6)))
+        count = max(1, round(float(end - begin) / whole * blocks))
         own = np.zeros(count)
         for channel in trial.case.channels:
             block = np.floor((channel.time - begin) / (end - begin) * count).astype(int)

@@ -69,7 +69,6 @@ class Element:
     name: str
     fmu: FmuDescription
     source: str
-    implementation: str = "any"
     bindings: tuple[Binding, ...] = ()
     execution: str = ""
     step: float | None = None
@@ -173,12 +172,6 @@ def _execution(element: Element) -> Execution:
         raise FmuError(
             f"component {element.name!r} is to run {element.execution!r}; choose continuous, coupled or sampled."
         )
-    if (
-        element.implementation == "CoSimulation"
-        and element.step is None
-        and not element.fmu.supports_model_exchange
-    ):
-        return "coupled"
     return default_execution(element.fmu, element.step)
 
 

@@ -60,7 +60,8 @@ class SystemInstance(Instance):
         order = sorted(self._others, key=lambda c: c.execution == "sampled")
         self._stepped = [Stepped(c, self.parts[c.name], self._wiring, self._driven(c.name)) for c in order]
         self._time = 0.0
-        self._ports: dict[tuple[str, tuple[str, ...]], Port] = {}
+        self._names = list(description.variables)
+        self._ports: dict[tuple[str, str], Port] = {}
 
     def _driven(self, name: str) -> list[str]:
         """Inputs of a stepped component that come from outside the system."""
@@ -96,25 +97,20 @@ class SystemInstance(Instance):
 
     def initialize_end(self) -> None:
         """Settle the connections and leave Initialization Mode."""
-        self._first_guess()
+        self._begin_stepped()
         self._wiring.propagate(self._time, events=True)
-        self._write_stepped()
+        for stepped in self._stepped:
+            stepped.write_inputs()
         for name, part in self.parts.items():
             with _named(name):
                 part.initialize_end()
+        self._begin_stepped()
+
+    def _begin_stepped(self) -> None:
+        """Take the stepped components' outputs as they are now."""
         for stepped in self._stepped:
             stepped.begin(self._time)
             stepped.put(self._time)
-
-    def _first_guess(self) -> None:
-        """Outputs of stepped components as their start values give them."""
-        for stepped in self._stepped:
-            stepped.begin(self._time)
-            stepped.put(self._time)
-
-    def _write_stepped(self) -> None:
-        for stepped in self._stepped:
-            stepped.write_inputs()
 
     def terminate(self) -> None:
         """End the run in every component."""
@@ -163,12 +159,10 @@ class SystemInstance(Instance):
                 out[column] = (value[0] - offset) / factor if is_input else factor * value[0] + offset
 
     def _name(self, reference: int) -> str:
-        if not hasattr(self, "_names"):
-            self._names = list(self.description.variables)
         return self._names[reference]
 
     def _port(self, part: str, variable: str) -> Port:
-        key = (part, (variable,))
+        key = part, variable
         if key not in self._ports:
             self._ports[key] = Port(self.parts[part], [variable], [0])
         return self._ports[key]

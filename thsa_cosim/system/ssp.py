@@ -204,7 +204,6 @@ def _component(
         name=name,
         fmu=fmus[source],
         source=source,
-        implementation=element.get("implementation", "any"),
         bindings=bindings,
         execution=given.get("kind", ""),
         step=_float(given.get("step")),

@@ -156,7 +156,7 @@ def _orthonormal(slopes: FloatArray) -> FloatArray:
 
 def _floor(values: FloatArray) -> float:
     """Variance of the white part of a residual; no more than all of it."""
-    return min(noise_estimate(values) ** 2, float(np.mean(values**2)))
+    return min(noise_estimate(values, smooth=False) ** 2, float(np.mean(values**2)))
 
 
 def _recording(rest: _Rest) -> Iterator[Finding]:

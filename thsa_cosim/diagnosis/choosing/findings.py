@@ -13,6 +13,7 @@ from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown
 from thsa_cosim.diagnosis.results import FoundEffect, Judged, Value
+from thsa_cosim.signals import FloatArray
 
 #: An error above this share of its value leaves it open; one above this share of the drawing's is the drawing's.
 CLEAR, NO_MORE = 1.0 / 3.0, 0.95
@@ -22,9 +23,12 @@ NO_MACHINE = Machine({}, {})
 HUGE = 10.0
 
 
-def values_of(fit: Fit, *, declared: bool) -> dict[str, Value]:
-    """The declared parameters (or the others) of a fit with standard errors, widened by what it leaves."""
-    stderr = fit.stderr(fit.inflation)
+def values_of(fit: Fit, *, declared: bool, stderr: FloatArray | None = None) -> dict[str, Value]:
+    """The declared parameters (or the others) of a fit with standard errors ``stderr`` (n,).
+
+    Default: those of white residuals, widened by what it leaves; enough for what is only listed.
+    """
+    stderr = fit.stderr(fit.inflation) if stderr is None else stderr
     return {
         u.name: Value(float(x), u.unit, float(s), undetermined(u, float(x), float(s)))
         for u, x, s in zip(fit.unknowns.members, fit.vector, stderr, strict=True)
@@ -66,12 +70,17 @@ def vague(members: Sequence[Scored], values: Mapping[str, Value]) -> dict[str, V
     return found
 
 
-def found_effects(found: Attribution, fit: Fit, machine: Machine = NO_MACHINE) -> tuple[FoundEffect, ...]:
-    """The accepted effects with the values of the extended model; variants and places of one effect are one."""
+def found_effects(
+    found: Attribution, fit: Fit, machine: Machine = NO_MACHINE, stderr: FloatArray | None = None
+) -> tuple[FoundEffect, ...]:
+    """The accepted effects with the values of the extended model; variants and places of one effect are one.
+
+    ``stderr`` (n,): of the unknowns of ``fit``, as in `values_of`.
+    """
     merged: dict[str, list[Scored]] = {}
     for scored in found.accepted:
         merged.setdefault(scored.candidate.effect.name, []).append(scored)
-    values = values_of(fit, declared=False)
+    values = values_of(fit, declared=False, stderr=stderr)
     effects = []
     for members in merged.values():
         owner = _round_of(found, members[0])

@@ -118,4 +118,4 @@ def test_only_a_scenario_that_identifies_has_sensitivities(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.run_command(["check", str(tmp_path / "any.fmu"), "--sensitivity"]) == 2
-    assert "needs a scenario that identifies parameters" in capsys.readouterr().err
+    assert "needs a scenario with recordings to fit and [[parameters]]" in capsys.readouterr().err

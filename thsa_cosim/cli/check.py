@@ -162,10 +162,12 @@ def _sensitivities(path: Path) -> "tuple[PointSensitivity, ...]":
 
     loaded = load(path) if path.suffix.lower() == ".toml" else None
     stages = [s.scenario for s in loaded.stages] if isinstance(loaded, StagedScenario) else [loaded]
-    scenarios = [s for s in stages if isinstance(s, Scenario) and s.points and s.points[0].fit]
+    scenarios = [
+        s for s in stages if isinstance(s, Scenario) and s.points and s.points[0].fit and len(s.parameters)
+    ]
     if not scenarios:
         raise ScenarioError(
-            f"{path}: --sensitivity needs a scenario that identifies parameters; leave it out."
+            f"{path}: --sensitivity needs a scenario with recordings to fit and [[parameters]]; add them."
         )
     return tuple(point for scenario in scenarios for point in sensitivity(scenario, Executor()))
 

@@ -81,7 +81,7 @@ def near_best(scored: Sequence[Scored]) -> list[Scored]:
 
 
 def insignificant(choice: Scored) -> str:
-    """Why a fit cannot be told from a model without the effect, or "".
+    """Why a fit cannot be distinguished from a model without the effect, or "".
 
     Wald's test of all its coefficients together: one of them may well be zero. What the recordings say is widened by
     what they leave unexplained; what the drawing says is not.

@@ -3,6 +3,7 @@
 ``run``               the use case as a function
 ``problem``           scenario → what is searched at each point
 ``point``             the search at one point: evolution, polish, uncertainty
+``sensitivity``       before a search: what the recordings say about each parameter
 ``over_temperature``  points → laws
 ``force``             the force residual
 ``results``           what comes out

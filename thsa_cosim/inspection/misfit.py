@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from thsa_cosim.inspection.across import SLIPS, slip
 from thsa_cosim.inspection.finding import Finding, Severity
@@ -114,7 +113,9 @@ class _Rest:
         made = shapes.T @ self._basis[rows]
         gram = shapes.T @ shapes - made @ made.T
         size = np.sqrt(np.einsum("ij,ij->j", shapes, shapes))
-        scaled = np.linalg.lstsq(gram / np.outer(size, size), shapes.T @ self.values[rows] / size, rcond=1e-10)
+        scaled = np.linalg.lstsq(
+            gram / np.outer(size, size), shapes.T @ self.values[rows] / size, rcond=1e-10
+        )
         return np.asarray(scaled[0] / size)
 
     def whole(self, column: _Column) -> FloatArray:
@@ -292,6 +293,8 @@ def _settled_delay(rest: _Rest, best: _Slip) -> _Slip:
         return best
     every = range(len(rest.own))
     which = [k for k in every if best.kind == "common-delay" or rest.own[k].channel == best.channel]
+
+    from scipy.optimize import minimize_scalar  # slow to import, and slips are rare
 
     def left(by: float) -> float:
         return rest.beside_late(_late(rest, which, by), which, by)

@@ -81,7 +81,7 @@ class Variable:
 
     @property
     def may_stay_open(self) -> bool:
-        """Whether it is an input that needs no signal: a temperature that starts below absolute zero, which none has."""
+        """Whether it is an input that needs no signal: a temperature that starts below absolute zero."""
         zero = _ABSOLUTE_ZERO.get(self.unit or "")
         return self.causality == "input" and None not in (zero, self.start) and self.start < zero  # type: ignore[operator]
 

@@ -164,10 +164,7 @@ def raised_inputs(description: FmuDescription, time: FloatArray) -> Signals | No
     By a tenth of the range or of the start value, or by the nominal value, whichever is declared.
     """
     ramp = np.clip(2.0 * (time - time[0]) / (time[-1] - time[0]), 0.0, 1.0)
-    values = {
-        v.name: (v.start or 0.0) + _amplitude(v) * ramp
-        for v in excitable(description)
-    }
+    values = {v.name: (v.start or 0.0) + _amplitude(v) * ramp for v in excitable(description)}
     return Signals(time, values) if values else None
 
 

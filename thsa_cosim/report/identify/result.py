@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from thsa_cosim.identify.results import ChannelError, IdentifyResult, LawResult, PointResult
+from thsa_cosim.identify.results import IdentifyResult, LawResult, PointResult
 from thsa_cosim.laws import Law
 from thsa_cosim.report.files import plain, write_csv
+from thsa_cosim.study import ChannelError
 
 
 def identify_to_dict(result: IdentifyResult) -> dict[str, Any]:
@@ -168,11 +169,15 @@ def _law(law: LawResult, result: IdentifyResult) -> dict[str, Any]:
         "covariance": None if law.law.covariance is None else law.law.covariance.tolist(),
         "chi2": law.law.chi2,
         "identifiable": law.determined,
+        "doubts": [asdict(doubt) for doubt in law.doubts],
     }
     if law.law.knots:
         content["knots"] = list(law.law.knots)
     if law.published is not None:
-        content["published"] = _coefficients(law.published)
+        content["published"] = {
+            **_coefficients(law.published),
+            "doubts": [asdict(doubt) for doubt in law.published_doubts],
+        }
         content["largest_deviation"] = {"points": law.deviation, "law": law.law_deviation}
     return content
 

@@ -14,9 +14,7 @@ from thsa_cosim.modelica.syntax import ClassDefinition, Component, Extends
 __all__ = ["Experiment", "FlatEquation", "FlatModel", "FlatVariable", "flatten", "list_models", "locate"]
 
 
-def flatten(
-    model: str, package: Path, libraries: Sequence[Path] = (), *, folded: bool = False
-) -> FlatModel:
+def flatten(model: str, package: Path, libraries: Sequence[Path] = (), *, folded: bool = False) -> FlatModel:
     """Flatten a Modelica class.
 
     Parameters

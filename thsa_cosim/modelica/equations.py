@@ -211,7 +211,7 @@ class Collector:
         if given is not None and given.op == "name" and given.args[-1][0] == "warning":
             level = "warning"
         text = message if isinstance(message, str) else "an assertion is violated"
-        if condition is False and level == "error":
+        if level == "error" and (condition is False or evaluator.by_default(condition) is False):
             raise ModelicaError(f"{place}: an assertion fails: {text.rstrip('.')}.")
         self.assertions.append(Assertion(condition, text, level, place))
 

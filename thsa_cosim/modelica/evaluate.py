@@ -162,12 +162,25 @@ class Evaluator:
             conditions.append((chosen, self.value(branch)))
         else:
             result = self.value(otherwise)
-        if conditions and self.tuned([c for c, _ in conditions]) and _has_rate([result, *(v for _, v in conditions)]):
+        if (
+            conditions
+            and self.tuned([c for c, _ in conditions])
+            and _has_rate([result, *(v for _, v in conditions)])
+        ):
             chosen = [v for c, v in conditions if self.fixed(c, expression, "the condition of a derivative")]
             return chosen[0] if chosen else result
         for condition, branch_value in reversed(conditions):
             result = self.select(condition, branch_value, result, expression)
         return result
+
+    def by_default(self, condition: Scalar) -> bool | None:
+        """What a condition on parameters that are no Reals is before they are set; None for other conditions."""
+        if not self.tuned([condition]):
+            return None
+        structural = set(self.scope.world.structural)
+        value = self.fixed(condition, Syntax("boolean", (False,)), "a condition")
+        self.scope.world.structural = structural
+        return bool(value)
 
     def tuned(self, conditions: Sequence[Scalar]) -> bool:
         """Whether conditions depend on nothing but parameters that are no Reals."""
@@ -470,7 +483,7 @@ def variable_value(variable: Variable) -> Scalar:
 
 
 def _tunable(variable: Variable) -> bool:
-    """Whether a parameter that is no Real can be set in the FMU: one of the exported class itself, with a plain value."""
+    """Whether a parameter that is no Real can be set in the FMU: the exported class' own one, with a plain value."""
     return (
         variable.variability == "parameter"
         and variable.type in ("Integer", "Boolean", "enumeration")

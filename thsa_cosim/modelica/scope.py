@@ -154,7 +154,9 @@ class Scope:
                 redeclared[element.name] = Modifier(redeclare=(element, self))
         outer = merge(self.given, Modifier(children=redeclared)) if redeclared else self.given
         if self.original is not None:
-            self._inherit_scope(*self.original, merge(outer, modifier(definition.arguments, None, self)), found)
+            self._inherit_scope(
+                *self.original, merge(outer, modifier(definition.arguments, None, self)), found
+            )
         if definition.base is not None:
             self._inherit(definition.base, definition.arguments, outer, definition.line, found)
             return
@@ -331,7 +333,9 @@ class Scope:
         if given is not None and given.redeclare is not None:
             replacement, scope = given.redeclare
             if not isinstance(replacement, ClassDefinition):
-                raise ModelicaError(f"{scope.place(replacement.line)}: {declaration.name} is a class, not a component.")
+                raise ModelicaError(
+                    f"{scope.place(replacement.line)}: {declaration.name} is a class, not a component."
+                )
             rest = Modifier(None, given.children)
             constraint = _constraint(declaration, owner)
             if replacement.extending:
@@ -392,7 +396,7 @@ def _constraint(declaration: Component | ClassDefinition, owner: Scope) -> Modif
 
 
 def check_replaceable(element: Element, scope: Scope, replacement: Component | ClassDefinition) -> None:
-    """Raises ModelicaError where what is redeclared is not replaceable, or the other class does not fit its constraint."""
+    """Raises ModelicaError where what is redeclared is not replaceable, or the class does not fit the constraint."""
     declaration, owner, _ = element
     place = scope.place(replacement.line)
     if not declaration.prefixes & {"replaceable", "redeclare"}:
@@ -423,7 +427,9 @@ def resolved(element: Element) -> tuple[Component, Scope, Modifier | None]:
         return declaration, owner, merge(given, modifier(declaration.arguments, declaration.value, owner))
     replacement, scope = given.redeclare
     if not isinstance(replacement, Component):
-        raise ModelicaError(f"{scope.place(replacement.line)}: {declaration.name} is a component, not a class.")
+        raise ModelicaError(
+            f"{scope.place(replacement.line)}: {declaration.name} is a component, not a class."
+        )
     check_replaceable(element, scope, replacement)
     outer = Modifier(given.binding, given.children, None, given.each, given.final)
     own = modifier(replacement.arguments, replacement.value, scope)

@@ -78,4 +78,6 @@ class _Checker:
             if self.boolean(value) is (not wanted):
                 what = "a number" if wanted else "a Boolean"
                 needs = "a Boolean" if wanted else "a number"
-                raise ModelicaError(f"{place}: in {text(term)}, {text(value)} is {what}; it has to be {needs}.")
+                raise ModelicaError(
+                    f"{place}: in {text(term)}, {text(value)} is {what}; it has to be {needs}."
+                )

@@ -156,6 +156,10 @@ def _round(
     gains = largest_gains(selection.current, proposals, seed)
     limit = threshold(gains)
     scored = selection.refined(proposals, limit)
+    if whole:
+        scored, proposals = selection.refined_further(scored, proposals, limit)
+        gains = largest_gains(selection.current, proposals, seed)
+        limit = threshold(gains)
     choice, objections = selection.choose(scored, limit, not accepted, not whole)
     rivals: tuple[Scored, ...] = ()
     if choice is not None and whole:

@@ -17,6 +17,7 @@ from thsa_cosim.diagnosis.choosing.gates import (
 )
 from thsa_cosim.diagnosis.choosing.score import Scored, go_on, polish, score
 from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.choosing.starts import further_starts
 from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE, is_visible
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -37,6 +38,9 @@ RIVAL_WORTH = 0.3
 #: A small further effect that explains this share of what is left is fitted with all parameters before it is judged:
 #: what the first one's parameters have taken up of it counts for it as well.
 HALF = 0.5
+
+#: A further start is refined if it promises this much more than the candidate's starts before.
+BETTER = 1.05
 
 Say = Callable[[str], None]
 
@@ -93,6 +97,21 @@ class Selection:
         most = max((s.fit_gain for s in scored), default=0.0)
         scored = [self._go_on(s) if s.fit_gain > RIVAL_WORTH * most else s for s in scored]
         return sorted(scored, key=lambda s: -s.held_out_gain)
+
+    def refined_further(
+        self, scored: Sequence[Scored], proposals: Sequence[Proposal], limit: float
+    ) -> tuple[list[Scored], list[Proposal]]:
+        """What is worth it from further starts of its shapes, where no fit so far leaves nothing; and these starts."""
+        if not proposals or any(self.weights.left(s.validate) < SMALLEST_STRUCTURE**2 for s in scored):
+            return list(scored), list(proposals)
+        self.say("searching further starts of the effects' shapes")
+        further = further_starts(self.bench, self.current, proposals)
+        before: dict[str, float] = {}
+        for p in proposals:
+            before[p.candidate.key] = max(before.get(p.candidate.key, 0.0), p.gain)
+        better = [p for p in further if p.gain > BETTER * before[p.candidate.key]]
+        both = sorted([*scored, *self.refined(better, limit)], key=lambda s: -s.held_out_gain)
+        return both, sorted([*proposals, *further], key=lambda p: -p.gain)
 
     def evidence(self, one: Scored) -> Evidence:
         """What speaks for a candidate."""
@@ -164,7 +183,7 @@ class Selection:
 
     def _whole(self, one: Scored) -> Scored:
         self.say(f"fitting {one.candidate.name} with all parameters")
-        return polish(self.bench, one, self.current, self.held)
+        return polish(self.bench, one, self.current, self.held, apart=True)
 
     def _go_on(self, one: Scored) -> Scored:
         return go_on(self.bench, one, self.current, self.held)

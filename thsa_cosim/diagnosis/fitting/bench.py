@@ -1,8 +1,10 @@
 """Vectors of unknowns → residuals of the recordings, by batches over a runner."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from thsa_cosim.batch import Job, Runner, Status
 from thsa_cosim.diagnosis.fitting.trials import Part, Trial
@@ -24,6 +26,7 @@ class Bench:
         self._fixed = dict(fixed or {})
         self.weights: Mapping[str, float] = {}
         """Factors of the channels' residuals, 1 where none is given."""
+        self._width = 0.0
 
     def factors(self, part: Part) -> FloatArray:
         """(N,) what the stacked residuals of ``part`` are multiplied by."""
@@ -34,6 +37,18 @@ class Bench:
                 for channel in trial.case.channels
             ]
         )
+
+    @contextmanager
+    def smoothed(self, width: float) -> Iterator[None]:
+        """Within it every signal's residuals are smoothed in time by a Gaussian of ``width`` seconds.
+
+        White noise of a standard deviation of 1 keeps it.
+        """
+        self._width = width
+        try:
+            yield
+        finally:
+            self._width = 0.0
 
     def of(self, part: Part) -> tuple[Trial, ...]:
         """The recordings that play ``part``."""
@@ -62,8 +77,21 @@ class Bench:
                 else:
                     self.failures[outcome.reason] = self.failures.get(outcome.reason, 0) + 1
             residual = np.concatenate(parts) if len(parts) == len(trials) else None
+            if residual is not None and self._width > 0.0:
+                residual = self._smooth(trials, residual)
             found.append(residual if residual is None or factors is None else residual * factors)
         return found
+
+    def _smooth(self, trials: Sequence[Trial], residual: FloatArray) -> FloatArray:
+        smooth = np.empty_like(residual)
+        begin = 0
+        for trial in trials:
+            for channel in trial.case.channels:
+                part = slice(begin, begin := begin + channel.measured.size)
+                width = self._width / float(np.median(np.diff(channel.time)))  # samples
+                size = np.sqrt(max(1.0, 2.0 * np.sqrt(np.pi) * width))
+                smooth[part] = size * gaussian_filter1d(residual[part], width)
+        return smooth
 
     def signals(self, unknowns: Unknowns, vector: FloatArray) -> dict[str, Signals | None]:
         """The simulated outputs of every recording, by experiment name; None where the run failed."""

@@ -32,10 +32,10 @@ def separating_experiment(
     """The profile of ``spec.command`` and ``spec.load`` at which an effect and its rival differ most.
 
     ``trials`` run the model that holds all effects. The first pair that the recordings cannot tell apart counts, else
-    the first effect and its runner-up. ``distance`` is the sum over the outputs' samples of the squared difference of both models, as fitted
-    to the present recordings, in variances of the noise; ``present`` the same on the fit recordings, for as long a
-    time. The other inputs are held at what they were in the first fit recording. None without an accepted effect, a
-    second candidate or a command.
+    the first effect and its runner-up. ``distance`` is the sum over the outputs' samples of the squared difference of
+    both models, as fitted to the present recordings, in variances of the noise; ``present`` the same on the fit
+    recordings, for as long a time. The other inputs are held at what they were in the first fit recording. None
+    without an accepted effect, a second candidate or a command.
     """
     pair, factors = _rivals(found)
     fit = [t for t in trials if t.part == "fit"]

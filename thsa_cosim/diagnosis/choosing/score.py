@@ -136,7 +136,7 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray, *, apar
     fits = [refine(bench, unknowns, choice.fit.vector, steps=choice.fit.steps)]
     if _above(ENOUGH, fits):
         fits.append(refine(bench, unknowns, drawing))
-    if apart and _above(LOST, fits):
+    if apart and _above(LOST, fits, bench.factors("fit")):
         fits += [refine_from_coarse(bench, unknowns, start) for start in _apart(bench, choice, fits)]
     best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)
     if best is None:
@@ -144,9 +144,9 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray, *, apar
     return _scored(bench, choice.proposal, best, current, held) or choice
 
 
-def _above(limit: float, fits: Sequence[Fit | None]) -> bool:
-    """Whether no fit so far leaves less than ``limit`` variances of the noise."""
-    return not any(f is not None and f.misfit <= limit * f.residual.size for f in fits)
+def _above(limit: float, fits: Sequence[Fit | None], factors: FloatArray | float = 1.0) -> bool:
+    """Whether no fit so far leaves less than ``limit`` variances of the noise, without ``factors`` (N,)."""
+    return not any(f is not None and np.mean((f.residual / factors) ** 2) <= limit for f in fits)
 
 
 def _apart(bench: Bench, choice: Scored, fits: Sequence[Fit | None]) -> list[FloatArray]:

@@ -17,7 +17,7 @@ from thsa_cosim.diagnosis.choosing.gates import (
 )
 from thsa_cosim.diagnosis.choosing.score import Scored, go_on, polish, score
 from thsa_cosim.diagnosis.choosing.screen import Proposal
-from thsa_cosim.diagnosis.choosing.starts import further_starts
+from thsa_cosim.diagnosis.choosing.starts import PROMISING, further_starts
 from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE, is_visible
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -39,6 +39,8 @@ RIVAL_WORTH = 0.3
 #: what the first one's parameters have taken up of it counts for it as well.
 HALF = 0.5
 
+#: Ripples at so many other wave numbers are refined where no fit leaves nothing.
+WAVES = 6
 #: A further start is refined if it promises this much more than the candidate's starts before.
 BETTER = 1.05
 
@@ -71,6 +73,22 @@ def other_places(winner: Proposal, proposals: Sequence[Proposal]) -> list[Propos
     return list(found.values())
 
 
+def other_waves(proposals: Sequence[Proposal], scored: Sequence[Scored]) -> list[Proposal]:
+    """The ripples among ``proposals`` (best first) at wave numbers that were not refined.
+
+    Where a ripple makes a machine stick and slip, what a small one would do hardly tells one order from another.
+    """
+    refined = {id(s.proposal) for s in scored}
+    best = proposals[0].gain if proposals else 0.0
+    return [
+        p
+        for p in proposals
+        if id(p) not in refined
+        and p.gain >= PROMISING * best
+        and any(q.scanned and not q.fixed for q in p.candidate.shapes)
+    ][:WAVES]
+
+
 @dataclass(frozen=True, eq=False)
 class Selection:
     """A round against the model so far: its fit ``current`` and its held-out residuals ``held`` (N,)."""
@@ -83,9 +101,12 @@ class Selection:
 
     def refined(self, proposals: Sequence[Proposal], limit: float) -> list[Scored]:
         """What is worth it, fitted with the declared parameters, best on held-out recordings first."""
+        return self._fitted(worth_refining(proposals, limit))
+
+    def _fitted(self, proposals: Sequence[Proposal]) -> list[Scored]:
         scored: list[Scored] = []
         solved = 0.0
-        for proposal in worth_refining(proposals, limit):
+        for proposal in proposals:
             if proposal.gain < RIVAL_WORTH * solved:
                 continue
             self.say(f"fitting {proposal.label}")
@@ -109,8 +130,9 @@ class Selection:
         before: dict[str, float] = {}
         for p in proposals:
             before[p.candidate.key] = max(before.get(p.candidate.key, 0.0), p.gain)
-        better = [p for p in further if p.gain > BETTER * before[p.candidate.key]]
-        both = sorted([*scored, *self.refined(better, limit)], key=lambda s: -s.held_out_gain)
+        better = worth_refining([p for p in further if p.gain > BETTER * before[p.candidate.key]], limit)
+        better = sorted([*better, *other_waves(proposals, scored)], key=lambda p: -p.gain)
+        both = sorted([*scored, *self._fitted(better)], key=lambda s: -s.held_out_gain)
         return both, sorted([*proposals, *further], key=lambda p: -p.gain)
 
     def evidence(self, one: Scored) -> Evidence:

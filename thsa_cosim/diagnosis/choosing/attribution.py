@@ -164,8 +164,10 @@ def _round(
     gains = largest_gains(selection.current, proposals, seed)
     limit = threshold(gains)
     scored = selection.refined(proposals, limit)
-    if whole:
-        scored, proposals = selection.refined_further(scored, proposals, limit)
+    if whole and proposals and selection.is_open(scored):
+        further = selection.further(proposals)
+        scored = selection.refined_further(scored, proposals, further, limit)
+        proposals = sorted([*proposals, *further], key=lambda p: -p.gain)
         gains = largest_gains(selection.current, proposals, seed)
         limit = threshold(gains)
     choice, objections = selection.choose(scored, limit, not accepted, not whole)

@@ -119,21 +119,30 @@ class Selection:
         scored = [self._go_on(s) if s.fit_gain > RIVAL_WORTH * most else s for s in scored]
         return sorted(scored, key=lambda s: -s.held_out_gain)
 
-    def refined_further(
-        self, scored: Sequence[Scored], proposals: Sequence[Proposal], limit: float
-    ) -> tuple[list[Scored], list[Proposal]]:
-        """What is worth it from further starts of its shapes, where no fit so far leaves nothing; and these starts."""
-        if not proposals or any(self.weights.left(s.validate) < SMALLEST_STRUCTURE**2 for s in scored):
-            return list(scored), list(proposals)
+    def is_open(self, scored: Sequence[Scored]) -> bool:
+        """Whether something is left to explain, and no fit so far leaves nothing."""
+        fits = [self.held, *(s.validate for s in scored)]
+        return all(self.weights.left(held) >= SMALLEST_STRUCTURE**2 for held in fits)
+
+    def further(self, proposals: Sequence[Proposal]) -> list[Proposal]:
+        """Further starts of the shapes of the best ``proposals``."""
         self.say("searching further starts of the effects' shapes")
-        further = further_starts(self.bench, self.current, proposals)
+        return further_starts(self.bench, self.current, proposals)
+
+    def refined_further(
+        self,
+        scored: Sequence[Scored],
+        proposals: Sequence[Proposal],
+        further: Sequence[Proposal],
+        limit: float,
+    ) -> list[Scored]:
+        """``scored`` and what is worth it of ``further`` starts and other wave numbers, fitted; best first."""
         before: dict[str, float] = {}
         for p in proposals:
             before[p.candidate.key] = max(before.get(p.candidate.key, 0.0), p.gain)
         better = worth_refining([p for p in further if p.gain > BETTER * before[p.candidate.key]], limit)
-        better = sorted([*better, *other_waves(proposals, scored)], key=lambda p: -p.gain)
-        both = sorted([*scored, *self._fitted(better)], key=lambda s: -s.held_out_gain)
-        return both, sorted([*proposals, *further], key=lambda p: -p.gain)
+        chosen = sorted([*better, *other_waves(proposals, scored)], key=lambda p: -p.gain)
+        return sorted([*scored, *self._fitted(chosen)], key=lambda s: -s.held_out_gain)
 
     def evidence(self, one: Scored) -> Evidence:
         """What speaks for a candidate."""

@@ -56,7 +56,7 @@ def test_smoothing_keeps_the_size_of_white_noise_and_ends_with_its_block(machine
 
 
 def test_no_smoothing_reaches_over_from_one_recording_into_the_next(machine: Bench) -> None:
-    both = Bench(machine._runner, [trial("fit"), trial("fit")])
+    both = Bench(Formula(slips), [trial("fit"), trial("fit")])  # type: ignore[arg-type]
     with both.smoothed(0.3):
         (found,) = both.residuals(START, START.start[None, :], "fit")
     with machine.smoothed(0.3):

@@ -7,7 +7,6 @@ import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.screen import Proposal
-from thsa_cosim.diagnosis.choosing.starts import points_around
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.continuation import refine_from_coarse
 from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
@@ -19,8 +18,6 @@ from thsa_cosim.signals import FloatArray
 ENOUGH = 1.05
 #: The same, above which anybody sees that it has: 1.1 times the noise.
 LOST = 1.21
-#: Points over the shapes' ranges that are tried as starts where a fit may have missed the optimum.
-RESTARTS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +126,7 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray, *, apar
     """The same with every Jacobian column fresh, and once more with the declared parameters from the drawing.
 
     A missing effect bends the declared parameters; from there an effect that acts by contact may not find its optimum.
-    ``apart``: where a fit is `LOST` even so, from other shapes of the effect, too, by way of smoothed residuals.
+    ``apart``: where a fit is `LOST` even so, from there by way of smoothed residuals, too.
     """
     unknowns = choice.fit.unknowns
     drawing = np.where([u.declared for u in unknowns.members], unknowns.start, choice.fit.vector)
@@ -137,7 +134,8 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray, *, apar
     if _above(ENOUGH, fits):
         fits.append(refine(bench, unknowns, drawing))
     if apart and _above(LOST, fits, bench.factors("fit")):
-        fits += [refine_from_coarse(bench, unknowns, start) for start in _apart(bench, choice, fits)]
+        start = min((f for f in fits if f is not None), key=lambda f: f.cost, default=choice.fit)
+        fits.append(refine_from_coarse(bench, unknowns, start.vector))
     best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)
     if best is None:
         return choice
@@ -147,23 +145,6 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray, *, apar
 def _above(limit: float, fits: Sequence[Fit | None], factors: FloatArray | float = 1.0) -> bool:
     """Whether no fit so far leaves less than ``limit`` variances of the noise, without ``factors`` (N,)."""
     return not any(f is not None and np.mean((f.residual / factors) ** 2) <= limit for f in fits)
-
-
-def _apart(bench: Bench, choice: Scored, fits: Sequence[Fit | None]) -> list[FloatArray]:
-    """(n,) starts: the best of ``fits``, and with the effect's shapes at the best of `RESTARTS` other points."""
-    best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=choice.fit)
-    shapes = [p for p in choice.candidate.shapes if p.variable in best.unknowns.names]
-    if not shapes:
-        return []
-    named = best.unknowns.named(best.vector)
-    centre = {**choice.proposal.shapes, **{p.name: named[p.variable] for p in shapes}}
-    points = points_around(choice.candidate, centre, 0.5, RESTARTS)
-    vectors = np.repeat(best.vector[None, :], RESTARTS, axis=0)
-    for vector, point in zip(vectors, points, strict=True):
-        vector[best.unknowns.index([p.variable for p in shapes])] = [point[p.name] for p in shapes]
-    found = bench.residuals(best.unknowns, vectors, "fit")
-    costs = [np.inf if r is None else float(r @ r) for r in found]
-    return [best.vector, vectors[int(np.argmin(costs))]]
 
 
 def extended_unknowns(declared: Unknowns, accepted: Sequence[Scored]) -> Unknowns:

@@ -42,6 +42,7 @@ def run(
     inputs: Signals | None = None,
     connectors: Mapping[str, Sequence[str]] | None = None,
     tolerance: float = 1e-9,
+    time: FloatArray = TIME,
 ) -> Signals:
     system, archives = assemble("ring", parts, wires, connectors or {})
     path = write_ssp(system, archives, folder / "ring.ssp", DefaultExperiment(0.0, 1.0))
@@ -49,7 +50,7 @@ def run(
     try:
         unpack(path, scratch.path / "system")
         with open_plant(read_description(path), scratch.path / "system") as plant:
-            return plant.run(values, inputs, outputs, TIME, tolerance=tolerance)
+            return plant.run(values, inputs, outputs, time, tolerance=tolerance)
     finally:
         scratch.remove()
 

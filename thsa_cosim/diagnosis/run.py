@@ -16,7 +16,7 @@ from thsa_cosim.diagnosis.catalogue.known import choose, known_effects
 from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
-from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, values_of
+from thsa_cosim.diagnosis.choosing.findings import between_rivals, found_effects, judged, values_of
 from thsa_cosim.diagnosis.choosing.orders import Machine, machine_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
@@ -182,7 +182,7 @@ class _Closing:
             )
         counts = dict(self.bench.failures)
         changed = after is not before
-        sure_before, sure_after = _sure(before), _sure(after)
+        sure_before, sure_after = _sure(before), np.hypot(_sure(after), between_rivals(found, after.fit))
         for identified in (before, after) if changed else (before,):
             for reason, count in identified.failures.items():
                 counts[reason] = counts.get(reason, 0) + count

@@ -36,6 +36,24 @@ def values_of(fit: Fit, *, declared: bool, stderr: FloatArray | None = None) -> 
     }
 
 
+def between_rivals(found: Attribution, fit: Fit) -> FloatArray:
+    """(n,) how far the unknowns of ``fit`` part between the accepted effects and their rivals, in their units.
+
+    Each of them may be the true one, and bends the declared parameters in its own way: the root of the mean square
+    over equally likely rivals. 0 for an effect's own parameters, which only mean something if it is the one.
+    """
+    variance = np.zeros(len(fit.unknowns.members))
+    declared = [k for k, u in enumerate(fit.unknowns.members) if u.declared]
+    names = [fit.unknowns.names[k] for k in declared]
+    for scored in found.accepted:
+        owner = _round_of(found, scored)
+        assert owner.accepted is not None
+        apart = [rival.fit.at(names) - owner.accepted.fit.at(names) for rival in owner.rivals]
+        if apart:
+            variance[declared] += np.sum(np.square(apart), axis=0) / (1 + len(apart))
+    return np.asarray(np.sqrt(variance))
+
+
 def undetermined(unknown: Unknown, value: float, stderr: float) -> str:
     """Why the recordings do not determine an unknown, or ""; how large an effect's parameter is says `vague`."""
     if not unknown.lower < value < unknown.upper:

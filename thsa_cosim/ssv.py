@@ -1,4 +1,4 @@
-"""Parameter sets as SSV files: System Structure and Parameterization 1.0, ``SystemStructureParameterValues``; read: 2.0, too.
+"""Parameter sets as SSV files: System Structure and Parameterization 1.0 (reading: 2.0, too).
 
 Source: Modelica Association, *System Structure and Parameterization* 1.0 (2019), section 6, and its XSD.
 """

@@ -1,6 +1,7 @@
 """SSP archives: written, read back, nested, and refused in one sentence."""
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -111,15 +112,17 @@ def test_the_archive_says_which_interface_of_an_fmu_runs(tmp_path: Path) -> None
 
 
 def test_a_written_system_is_read_back_and_written_the_same(tmp_path: Path) -> None:
-    parts = [Part("fast", build.lag2()), Part("slow", build.lag3(), "sampled", 0.01, 0.005, {"k": 3.0})]
-    system, archives = assemble("ring", parts, RING, {"y": ["slow.y"]})
+    slow = Part("slow", build.lag3(), "sampled", 0.01, 0.005, {"k": 3.0}, jitter=0.001)
+    wires = [RING[0], replace(RING[1], disturbance="d")]
+    system, archives = assemble("ring", [Part("fast", build.lag2()), slow], wires, {"y": ["slow.y"]})
     path = write_ssp(system, archives, tmp_path / "a.ssp", DefaultExperiment(0.0, 2.0))
     description = read_description(path)
     again = description.system  # type: ignore[attr-defined]
-    assert [(c.name, c.execution, c.step, c.delay, dict(c.start)) for c in again.components] == [
-        ("fast", "continuous", None, 0.0, {}),
-        ("slow", "sampled", 0.01, 0.005, {"k": 3.0}),
+    assert [(c.name, c.execution, c.step, c.delay, c.jitter, dict(c.start)) for c in again.components] == [
+        ("fast", "continuous", None, 0.0, 0.0, {}),
+        ("slow", "sampled", 0.01, 0.005, 0.001, {"k": 3.0}),
     ]
+    assert [c.disturbance for c in again.connections] == ["", "d"]
     assert set(again.connections) == set(system.connections)
     assert again.connectors == system.connectors
     assert description.default_experiment == DefaultExperiment(0.0, 2.0)

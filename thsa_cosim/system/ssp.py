@@ -192,16 +192,7 @@ def _component(
         return Nested(name, inner.elements, inner.links, inner.connectors, (*inner.bindings, *bindings))
     if source not in fmus:
         raise FmuError(f"{path} holds no {source}, which component {name!r} names; add it to the archive.")
-    how = next(
-        (
-            a
-            for a in element.iterfind(f"{{{SSD}}}Annotations/{{{SSC}}}Annotation")
-            if a.get("type") == ANNOTATION
-        ),
-        None,
-    )
-    run = None if how is None else how.find("Execution")
-    given: Mapping[str, str] = {} if run is None else run.attrib
+    given = _own(element, "Execution")
     return Element(
         name=name,
         fmu=fmus[source],
@@ -210,7 +201,17 @@ def _component(
         execution=given.get("kind") or _implementation(path, element),
         step=_float(given.get("step")),
         delay=_float(given.get("delay")) or 0.0,
+        jitter=_float(given.get("jitter")) or 0.0,
     )
+
+
+def _own(element: ET.Element, tag: str) -> Mapping[str, str]:
+    """Attributes of what our annotation of an element says under ``tag``."""
+    for annotation in element.iterfind(f"{{{SSD}}}Annotations/{{{SSC}}}Annotation"):
+        found = annotation.find(tag) if annotation.get("type") == ANNOTATION else None
+        if found is not None:
+            return found.attrib
+    return {}
 
 
 def _implementation(path: Path, element: ET.Element) -> str:
@@ -254,6 +255,7 @@ def _link(connection: ET.Element) -> Link:
         factor,
         offset,
         connection.get("suppressUnitConversion") in ("true", "1"),
+        _own(connection, "Disturbance").get("name", ""),
     )
 
 

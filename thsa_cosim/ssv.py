@@ -15,7 +15,7 @@ from thsa_cosim.units import base_exponents
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 FLOATS = ("Real", "Float64", "Float32")
-"""Real of SSP 1.0 and what SSP 2.0 has beside it, as FMI 3.0 does."""
+"""Real of SSP 1.0, and the types of FMI 3.0 that SSP 2.0 adds."""
 _NUMBERS = (
     *FLOATS,
     "Integer",

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from thsa_cosim import __version__
 from thsa_cosim.batch import Experiment, Job, Outcome
 from thsa_cosim.errors import StudyError
-from thsa_cosim.inspection import Residual, Trust, judge
+from thsa_cosim.inspection import Inspection, Residual, Trust, judge, misfits
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario
 from thsa_cosim.signals import FloatArray, Signals
@@ -65,6 +66,19 @@ class SimulateResult:
     files: tuple[Path, ...]
     notes: tuple[str, ...] = ()
 
+    @cached_property
+    def data(self) -> Inspection:
+        """What is wrong with the recordings, and which slip of a signal explains what the model leaves of them."""
+        found = self.scenario.data
+        known = {(f.recording, f.channel, f.kind) for f in found.findings}
+        slips = [
+            f
+            for r in self.recordings
+            for f in misfits(_residuals(self.scenario, r), self.scenario.file_units)
+        ]
+        slips = [f for f in slips if (f.recording, f.channel, f.kind) not in known]
+        return Inspection.of((*found.findings, *slips), found.repairs)
+
     @property
     def trust(self) -> Trust:
         """Whether the model leaves nothing but noise of the fit recordings (of all, without any)."""
@@ -82,7 +96,7 @@ class SimulateResult:
             "failures": dict(self.failures),
             "fmu": {"path": str(self.scenario.fmu.path), "sha256": self.scenario.fmu.sha256},
             "version": __version__,
-            "data": self.scenario.data.to_dict(),
+            "data": self.data.to_dict(),
             "trust": self.trust.to_dict(),
             "notes": list(self.notes),
             "recordings": [
@@ -257,6 +271,9 @@ def _residuals(scenario: Scenario, found: SimulatedRecording) -> list[Residual]:
                 noise,
                 found.errors[name].unit,
                 {n: inputs[n] for n in inputs.names},
+                time[kept],
+                simulated,
+                np.empty((int(np.sum(kept)), 0)),  # nothing is fitted here
             )
         )
     return residuals

@@ -120,6 +120,11 @@ class Scenario:
         return inspect((*self.fit, *self.validate), self.inputs)
 
     @property
+    def file_units(self) -> Mapping[str, str | None]:
+        """Unit of each signal's numbers in the files, as the scenario gives it; None: as the file states it."""
+        return {name: column.unit for name, column in self.table.recordings.columns.items()}
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What the recordings' reader has to say about them."""
         return tuple(note for recording in (*self.fit, *self.validate) for note in recording.notes)

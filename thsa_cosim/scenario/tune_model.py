@@ -15,6 +15,7 @@ from thsa_cosim.scenario.tune_schema import (
     MetricsTable,
     ParetoTable,
     ScheduleTable,
+    StartTable,
     SurfaceTable,
     TuneTable,
 )
@@ -184,6 +185,7 @@ class TuneScenario:
     cost: ControlCostSpec
     requirements: tuple[Requirement, ...]
     loop: LoopSpec | None
+    start: StartTable | None
     combine: Literal["worst", "sum"]
     uncertainty: UncertaintySpec | None
     schedule: ScheduleSpec | None

@@ -4,6 +4,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +12,11 @@ from thsa_cosim.costs import control_cost, settling_time
 from thsa_cosim.fmu import FmuDescription, SimulationFailure
 from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.linear import open_loop, state_names
-from thsa_cosim.scenario import TuneScenario
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.tune.margins import Margins, margins
+
+if TYPE_CHECKING:  # workers import this module
+    from thsa_cosim.scenario import TuneScenario
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,7 @@ class Terms:
     with_loop: bool
 
     @classmethod
-    def of(cls, scenario: TuneScenario) -> "Terms":
+    def of(cls, scenario: "TuneScenario") -> "Terms":
         """The terms that a scenario asks for."""
         peaks = tuple(dict.fromkeys(r.signal for r in scenario.requirements if r.signal))
         names = [
@@ -152,7 +155,7 @@ class ResponseReducer:
 
 
 def reducer(
-    scenario: TuneScenario, inputs: Mapping[str, float], fixed: Mapping[str, float]
+    scenario: "TuneScenario", inputs: Mapping[str, float], fixed: Mapping[str, float]
 ) -> ResponseReducer:
     """The reducer of one condition: its constant ``inputs`` and ``fixed`` start values, in the FMU's units."""
     command, metrics = scenario.command, scenario.metrics

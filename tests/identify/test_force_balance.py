@@ -12,9 +12,10 @@ from scipy.io import savemat
 
 from thsa_cosim.errors import ScenarioError
 from thsa_cosim.fmu import Plant
-from thsa_cosim.identify import Comparison, force_balance
+from thsa_cosim.identify import force_balance
 from thsa_cosim.scenario import ForceSpec, load_scenario
 from thsa_cosim.signals import Signals
+from thsa_cosim.study import Comparison
 
 ROOT = Path(__file__).parents[2]
 EMPS = ROOT / "scenarios" / "emps.toml"

@@ -4,6 +4,7 @@ import copy
 import datetime
 import shutil
 import string
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from thsa_cosim.errors import (
     ThsaCosimError,
     UnitError,
 )
+from thsa_cosim.fmu import read_description
 from thsa_cosim.scenario import KINDS, Scenario, load_scenario
 from thsa_cosim.ssv import ParameterSet, write_ssv
 
@@ -46,6 +48,16 @@ def sentence(folder, data, error=ThsaCosimError, **options):
     assert str(folder) in message
     assert "\n" not in message
     return message
+
+
+def test_a_temperature_that_starts_below_absolute_zero_needs_no_column() -> None:
+    fmu = read_description(ROOT / "fmus" / "THSA.fmu")
+    assert [v.name for v in fmu.inputs if v.may_stay_open] == ["T_motor", "T_gearbox", "T_screw"]
+    kelvin = replace(fmu.variables["T_motor"], unit="K", start=-1.0)
+    assert kelvin.may_stay_open
+    assert not replace(kelvin, start=0.0).may_stay_open
+    assert not replace(kelvin, causality="parameter").may_stay_open
+    assert not replace(kelvin, unit="m", start=-300.0).may_stay_open
 
 
 def test_a_valid_scenario_in_full(folder):

@@ -585,6 +585,6 @@ def _rate(unit: str | None) -> str | None:
     if unit in ("1", ""):
         return "1/s"
     if "/" not in unit:
-        return f"{unit}/s"
+        return "K/s" if unit == "degC" else f"{unit}/s"  # a change of temperature has no zero point
     top, bottom = unit.split("/", 1)
     return f"{top}/({bottom.strip('()')}.s)"

@@ -69,7 +69,7 @@ def roles(table: CommonTable, fmu: FmuDescription) -> tuple[tuple[str, ...], tup
         else:
             raise ScenarioError(f"{key} is a {variable.causality} of {fmu.path.name}; set it in [fixed].")
     for wanted in fmu.inputs:
-        if wanted.name not in columns and wanted.is_float:
+        if wanted.name not in columns and wanted.is_float and not wanted.may_stay_open:
             raise ScenarioError(
                 f"recordings.columns.{wanted.name} is missing: input {wanted.name!r} of {fmu.path.name} needs"
                 f" a column or a value."

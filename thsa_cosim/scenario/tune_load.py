@@ -68,7 +68,7 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
     axes = tuple(_axis(name, axis, fmu, f"conditions.{name}") for name, axis in table.conditions.items())
     driven = {command.input, *(axis.name for axis in axes)}
     for variable in fmu.inputs:
-        if variable.is_float and variable.name not in driven:
+        if variable.is_float and variable.name not in driven and not variable.may_stay_open:
             raise ScenarioError(
                 f"conditions.{variable.name} is missing: input {variable.name!r} of {fmu.path.name} needs values."
             )

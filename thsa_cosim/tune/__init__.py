@@ -6,7 +6,7 @@
 ``margins``     gain margin, phase margin and bandwidth of the opened loop
 ``combine``     terms over conditions → one cost, with hard and soft requirements
 ``samples``     parameter samples from an identification's covariance
-``evaluate``    vectors → simulations → costs, with the journal
+``evaluate``    sets of gains under all conditions, term by term
 ``population``  the population's path, and the line it draws towards
 ``pareto``      non-dominated gains
 ``schedule``    gains over conditions: smoothing and interpolation

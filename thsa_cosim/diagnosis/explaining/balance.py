@@ -224,7 +224,8 @@ def record_of(recording: Recording, spec: BalanceSpec, formulas: tuple[Formula, 
     reach = int(np.ceil(_REACH / (spec.band * step)))
     if size < 4 * reach or 2.0 * spec.band * step >= 0.9:
         return None
-    names = frozenset().union(*(f.names for f in formulas), spec.moving)
+    # In an order of their own: noise is drawn signal by signal.
+    names = sorted(frozenset().union(*(f.names for f in formulas), spec.moving))
     even = signals.resample(signals.time[0] + step * np.arange(size))
     values = {name: even[name] for name in names if name in even}
     still = np.zeros(size, dtype=bool)

@@ -6,6 +6,7 @@ table as it stands in the file, then a colon. Tables and keys that several kinds
 
 import ast
 import inspect
+import itertools
 import json
 import re
 import textwrap
@@ -111,7 +112,7 @@ def _docstrings(table: type) -> dict[str, str]:
     body = ast.parse(textwrap.dedent(inspect.getsource(table))).body[0].body
     return {
         key.target.id: inspect.cleandoc(below.value.value)
-        for key, below in zip(body, body[1:], strict=False)
+        for key, below in itertools.pairwise(body)
         if isinstance(key, ast.AnnAssign)
         and isinstance(below, ast.Expr)
         and isinstance(below.value, ast.Constant)

@@ -9,7 +9,14 @@ from typing import Literal
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.scenario.schema import SearchTable, SimulationTable
-from thsa_cosim.scenario.tune_schema import LineTable, MetricsTable, ParetoTable, SurfaceTable, TuneTable
+from thsa_cosim.scenario.tune_schema import (
+    LineTable,
+    MetricsTable,
+    ParetoTable,
+    StartTable,
+    SurfaceTable,
+    TuneTable,
+)
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import convert
 
@@ -187,6 +194,7 @@ class TuneScenario:
     cost: ControlCostSpec
     requirements: tuple[Requirement, ...]
     loop: LoopSpec | None
+    start: StartTable | None
     combine: Literal["worst", "sum"]
     uncertainty: UncertaintySpec | None
     schedule: ScheduleSpec | None

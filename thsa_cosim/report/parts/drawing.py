@@ -95,7 +95,7 @@ def save(figure: content.Figure, path: Path) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     sheet = draw(figure)
     sheet.set_dpi(DOTS_PER_INCH)
-    canvas = FigureCanvasAgg(sheet)
+    canvas: Any = FigureCanvasAgg(sheet)
     canvas.draw()
     path.write_bytes(png(np.asarray(canvas.buffer_rgba())[:, :, :3]))
     return path

@@ -231,7 +231,8 @@ def _cases(scenario: Scenario) -> list[tuple[Recording, str, Experiment]]:
 def _compare(scenario: Scenario, recording: Recording, role: str, outcome: Outcome) -> SimulatedRecording:
     errors: Mapping[str, ChannelError] = {}
     if outcome.signals is not None:
-        given = {name: c.noise for name, c in scenario.cost.channels.items() if c.noise is not None}
+        own = {name: channel.given_noise for name, channel in scenario.cost.channels.items()}
+        given = {name: noise for name, noise in own.items() if noise is not None}
         errors = compare(recording, role, scenario.measured, given, outcome.signals).errors
     return SimulatedRecording(
         name=recording.name,

@@ -323,7 +323,7 @@ def _loop(table: TuneTable, ends: float, fmu: FmuDescription, space: ParameterSp
     if table.loop.margins == "python-control" and importlib.util.find_spec("control") is None:
         raise MissingExtraError("loop.margins = 'python-control'", "control")
     variables = tuple(space[name].variable for name in names)
-    return LoopSpec(table.loop.signal, at, variables, table.loop.margins)
+    return LoopSpec.resolved(table.loop, at=at, gains=variables)
 
 
 def _start(table: TuneTable, fmu: FmuDescription) -> StartTable | None:
@@ -350,6 +350,4 @@ def _schedule(table: TuneTable, axes: Sequence[Axis], fmu: FmuDescription) -> Sc
     if len(set(spec.over)) < len(spec.over):
         raise ScenarioError("schedule.over names a condition twice; remove one.")
     swept = {name: _axis(name, t, fmu, f"schedule.check.{name}") for name, t in spec.check.items()}
-    return ScheduleSpec(
-        tuple(spec.over), spec.smoothing, spec.reserve, tuple(swept.get(a.name, a) for a in axes)
-    )
+    return ScheduleSpec.resolved(spec, check=tuple(swept.get(a.name, a) for a in axes))

@@ -4,6 +4,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,12 +12,14 @@ from thsa_cosim.costs import control_cost, settling_time
 from thsa_cosim.fmu import FmuDescription, SimulationFailure
 from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.linear import open_loop, state_names
-from thsa_cosim.scenario import TuneScenario
-from thsa_cosim.scenario.tune_model import CommandSpec
-from thsa_cosim.scenario.tune_schema import StartTable
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.tune.margins import Margins, margins
 from thsa_cosim.tune.start import start_terms
+
+if TYPE_CHECKING:  # workers import this module
+    from thsa_cosim.scenario import TuneScenario
+    from thsa_cosim.scenario.tune_model import CommandSpec
+    from thsa_cosim.scenario.tune_schema import StartTable
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,7 @@ class Terms:
     with_loop: bool
 
     @classmethod
-    def of(cls, scenario: TuneScenario) -> "Terms":
+    def of(cls, scenario: "TuneScenario") -> "Terms":
         """The terms that a scenario asks for."""
         peaks = tuple(dict.fromkeys(r.signal for r in scenario.requirements if r.signal))
         names = [
@@ -115,7 +118,7 @@ class ResponseReducer:
     low: float | None
     window: tuple[float, float]
     settling_band: float
-    start: StartTable | None
+    start: "StartTable | None"
     loop: LoopTask | None
 
     @property
@@ -162,7 +165,7 @@ class ResponseReducer:
 
 
 def reducer(
-    scenario: TuneScenario, inputs: Signals, fixed: Mapping[str, float], command: CommandSpec
+    scenario: "TuneScenario", inputs: Signals, fixed: Mapping[str, float], command: "CommandSpec"
 ) -> ResponseReducer:
     """The reducer of one condition: its ``inputs``, its ``command`` and ``fixed`` start values, in the FMU's units."""
     metrics, loop = scenario.metrics, scenario.loop

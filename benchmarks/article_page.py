@@ -375,7 +375,7 @@ again. Of {all} claims {reproduced} are reproduced, {contradicted} contradicted 
 recordings), {absent} absent.
 
 ```sh
-thsa-cosim example article                     # the scenarios with their recordings, to run yourself
+thsa-cosim example article -o article          # the scenarios with their recordings, to run yourself
 python benchmarks/article.py                   # runs the studies and writes this page, its pictures and numbers
 python benchmarks/article.py --check           # compares new studies with the stored numbers
 ```

@@ -293,3 +293,12 @@ def test_dates_with_half_days(tmp_path, stamps):
     file.write_text(f"Date/Time;force [N]\n{rows}")
     found = read_recording(file, {"F": Column("force")}, time=TimeAxis("Date/Time"), units={"F": "N"})
     assert found.signals.time == pytest.approx([0.0, 0.5, 1.0, 3600.5])
+
+
+def test_a_point_where_the_comma_is_decimal_is_no_guess(tmp_path):
+    file = tmp_path / "mixed.csv"
+    rows = [f"{k},0;{900 + k},5" for k in range(20)]
+    rows[12] = "12,0;1.234"
+    file.write_text("\n".join(["t [s];F [N]", *rows]))
+    with pytest.raises(RecordingError, match=r"'F' is not numeric: '1\.234' on line 14"):
+        read_recording(file, {"F": Column("F")}, time=TimeAxis("t"), units={"F": "N"})

@@ -246,9 +246,11 @@ def _columns(
                 f"{path}: line {number} has more cells than the header names; repair the file."
             )
     lines = [line for _, line in rows]
+    # Where the comma is decimal, a point may be another decimal mark or part thousands: cell by cell says where it is.
+    ambiguous = layout.decimal == "," and any("." in line for line in lines)
     if layout.decimal == "," and layout.delimiter != ",":
         lines = [line.replace(",", ".") for line in lines]
-    if layout.decimal == "." or layout.delimiter != ",":
+    if not ambiguous and (layout.decimal == "." or layout.delimiter != ","):
         try:
             table = np.loadtxt(
                 lines,

@@ -181,7 +181,7 @@ def _cases(scenario: Scenario) -> list[tuple[Recording, str, Experiment]]:
                 inputs=scenario.drive(recording),
                 outputs=scenario.outputs,
                 time=_grid(scenario, recording),
-                fixed={**fixed, **start},
+                fixed={**fixed, **start, **recording.start},
                 tolerance=scenario.simulation.tolerance,
             )
             cases.append((recording, role, experiment))

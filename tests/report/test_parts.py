@@ -20,6 +20,7 @@ from thsa_cosim import cli
 from thsa_cosim.batch import Journal, read_journal
 from thsa_cosim.errors import InputError
 from thsa_cosim.report.folder import read_study
+from thsa_cosim.report.identify.doubts import LawDoubts, doubt_sentences
 from thsa_cosim.report.page import PAGE, write_page
 from thsa_cosim.report.parts.chart import envelope, packed, plain
 from thsa_cosim.report.parts.populations import evolutions
@@ -321,3 +322,19 @@ def test_reading_a_journal_takes_nothing_from_its_writer(tmp_path: Path) -> None
     path.write_text("stage,index,status,reason\n")
     with pytest.raises(InputError, match="is no journal of a study"):
         read_journal(path)
+
+
+def test_doubts_about_laws_are_told_once_where_both_laws_share_them() -> None:
+    law = {
+        "doubts": [{"kind": "sign", "severity": "warning", "text": "b is negative."}],
+        "published": {
+            "doubts": [
+                {"kind": "sign", "severity": "warning", "text": "b is negative, too."},
+                {"kind": "rate", "severity": "warning", "text": "b is fast."},
+            ]
+        },
+    }
+    assert doubt_sentences({"b": LawDoubts.read(law), "c": LawDoubts.read({})}) == [
+        "warning: b is negative. The published law does so, too.",
+        "warning: the published law of b: b is fast.",
+    ]

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from thsa_cosim.check import CheckReport
+    from thsa_cosim.identify.sensitivity import PointSensitivity
     from thsa_cosim.scenario import Scenario, StagedScenario, TuneScenario
 
 Checked = tuple[Mapping[str, Any], Callable[["Console"], None]]
@@ -37,6 +38,11 @@ FAILED = 3
 @click.option("--start", "starts", multiple=True, metavar="NAME=VALUE", help="FMU: a start value.")
 @click.option("--input", "ends", multiple=True, metavar="NAME=VALUE", help="FMU: final value of an input.")
 @click.option(
+    "--sensitivity",
+    is_flag=True,
+    help="Scenario: which parameter moves which signal, and the standard errors to expect, before any search.",
+)
+@click.option(
     "--compile", "compiled", type=PATH, help="FMU: build its C sources first, and write the FMU to this file."
 )
 def check(
@@ -48,6 +54,7 @@ def check(
     deadline: float,
     starts: tuple[str, ...],
     ends: tuple[str, ...],
+    sensitivity: bool,
     compiled: Path | None,
 ) -> int:
     """Describe an FMU, a recording or a scenario, and say what it can be trusted with.
@@ -61,7 +68,10 @@ def check(
 
         path = compile_sources(path, compiled)
     given = {"duration": duration, "step": step, "values": _pairs(starts), "ends": _pairs(ends)}
+    points = _sensitivities(path) if sensitivity else ()
     content, show = _checked(path, given, deadline)
+    if points:
+        content, show = _with_sensitivities(points, content, show)
     text = json.dumps(content, indent=2)
     if output is not None:
         output.write_text(text + "\n", encoding="utf-8")
@@ -143,6 +153,35 @@ def _scenario(path: Path, deadline: float) -> Checked:
         out.print(f"verdict: {verdict}", highlight=False)
 
     return content, show
+
+
+def _sensitivities(path: Path) -> "tuple[PointSensitivity, ...]":
+    """What the recordings of an identification say about its parameters, at their start values."""
+    from thsa_cosim.identify.sensitivity import sensitivity
+    from thsa_cosim.scenario import Executor, Scenario, StagedScenario, load
+
+    loaded = load(path) if path.suffix.lower() == ".toml" else None
+    stages = [s.scenario for s in loaded.stages] if isinstance(loaded, StagedScenario) else [loaded]
+    scenarios = [
+        s for s in stages if isinstance(s, Scenario) and s.points and s.points[0].fit and len(s.parameters)
+    ]
+    if not scenarios:
+        raise ScenarioError(
+            f"{path}: --sensitivity needs a scenario with recordings to fit and [[parameters]]; add them."
+        )
+    return tuple(point for scenario in scenarios for point in sensitivity(scenario, Executor()))
+
+
+def _with_sensitivities(
+    points: "tuple[PointSensitivity, ...]", content: Mapping[str, Any], show: Callable[["Console"], None]
+) -> Checked:
+    from thsa_cosim.report.identify.sensitivity import print_sensitivity, sensitivity_dict
+
+    def shown(out: "Console") -> None:
+        show(out)
+        print_sensitivity(out, points)
+
+    return {**content, "sensitivity": sensitivity_dict(points)}, shown
 
 
 def _fmu_of(loaded: "Scenario | StagedScenario | TuneScenario", deadline: float) -> "CheckReport":

@@ -50,8 +50,8 @@ class Step:
 def demo(output: Path, quick: bool) -> None:
     """Run every main command on the shipped data: export, check, identify, tune, diagnose.
 
-    Each step prints its command and its result. The demo takes a few minutes. It copies the data into the folder,
-    unless this is a checkout of the repository. Open index.html in the folder at the end.
+    Each step prints its command and its result. The demo takes about a minute on two idle cores. It copies the data
+    into the folder, unless this is a checkout of the repository. Open index.html in the folder at the end.
     """
     from rich.text import Text
 

@@ -133,7 +133,7 @@ class SeparatingExperiment:
 
 @dataclass(frozen=True)
 class EquivalenceClass:
-    """Candidates that the recordings cannot tell apart, and the smallest principal angle between two of them."""
+    """Candidates that the recordings cannot distinguish, and the smallest principal angle between two of them."""
 
     names: tuple[str, ...]
     angle_deg: float

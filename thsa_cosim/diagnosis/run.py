@@ -16,7 +16,7 @@ from thsa_cosim.diagnosis.catalogue.known import choose, known_effects
 from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
-from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, values_of
+from thsa_cosim.diagnosis.choosing.findings import between_rivals, found_effects, judged, values_of
 from thsa_cosim.diagnosis.choosing.orders import Machine, machine_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
@@ -32,6 +32,7 @@ from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified, identify_model
 from thsa_cosim.diagnosis.fitting.structure import errors, errors_by_recording
 from thsa_cosim.diagnosis.fitting.trials import Trial, spec_of, trials_of, with_fmu, with_wrapper
+from thsa_cosim.diagnosis.fitting.uncertainty import standard_errors
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import ChannelError, Comparison, DiagnosisResult, EmpiricalLaw
 from thsa_cosim.errors import StudyError
@@ -181,6 +182,7 @@ class _Closing:
             )
         counts = dict(self.bench.failures)
         changed = after is not before
+        sure_before, sure_after = _sure(before), np.hypot(_sure(after), between_rivals(found, after.fit))
         for identified in (before, after) if changed else (before,):
             for reason, count in identified.failures.items():
                 counts[reason] = counts.get(reason, 0) + count
@@ -194,13 +196,13 @@ class _Closing:
             fmu=scenario.fmu.path,
             fmu_sha256=scenario.fmu.sha256,
             verdict=verdict,
-            effects=found_effects(found, after.fit, self.machine),
+            effects=found_effects(found, after.fit, self.machine, sure_after),
             before=_errors(before),
             after=_errors(after) if changed else {"fit": {}, "validate": {}},
             recordings_before=_errors_by_recording(before),
             recordings_after=_errors_by_recording(after) if changed else {},
-            declared_before=values_of(before.fit, declared=True),
-            declared_after=values_of(after.fit, declared=True),
+            declared_before=values_of(before.fit, declared=True, stderr=sure_before),
+            declared_after=values_of(after.fit, declared=True, stderr=sure_after),
             unexplained=share,
             model=model,
             extended_fmu=extended,
@@ -258,6 +260,11 @@ def _built(accepted: Sequence[Scored], final: Fit) -> tuple[list[Candidate], dic
     """The candidates of an extended model and the values that it starts with."""
     values = {**final.unknowns.named(final.vector), **fixed_shapes(accepted)}
     return [s.candidate for s in accepted], values
+
+
+def _sure(identified: Identified) -> np.ndarray:
+    """(n,) standard errors of an identified model's unknowns."""
+    return standard_errors(identified.fit, [t for t in identified.trials if t.part == "fit"])
 
 
 def _errors(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:

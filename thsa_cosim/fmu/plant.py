@@ -36,7 +36,7 @@ class Plant:
     """An opened FMU: owns its unpacked folder and at most one live instance.
 
     Use it as a context manager. It is not safe against an FMU that crashes or hangs: runners put it into
-    a process of its own. Open one Plant at a time per process: many FMUs corrupt each other's instances.
+    a separate process. Open one Plant at a time per process: many FMUs corrupt each other's instances.
     """
 
     def __init__(

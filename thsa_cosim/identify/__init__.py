@@ -4,6 +4,7 @@
 ``problem``           scenario → what is searched at each point
 ``point``             the search at one point: evolution, polish, uncertainty
 ``interleave``        all points' searches over one runner
+``sensitivity``       before a search: what the recordings say about each parameter
 ``evaluate``          vectors → simulations → costs, with the journal
 ``over_temperature``  points → laws
 ``compare``           simulated against measured

@@ -6,7 +6,16 @@ import numpy as np
 
 from thsa_cosim.errors import InputError
 from thsa_cosim.identify.results import LawResult, PointResult
-from thsa_cosim.laws import FORMS, fit_law, largest_deviation, published_law, select_law
+from thsa_cosim.laws import (
+    FORMS,
+    candidates_for,
+    doubts_about,
+    fit_law,
+    largest_deviation,
+    published_law,
+    quantity_of,
+    select_law,
+)
 from thsa_cosim.scenario import LawTable
 
 
@@ -25,7 +34,9 @@ def fit_laws(
         estimates = [p.parameters[name] for p in members]
         values = np.array([e.value for e in estimates])
         stderr = np.array([np.nan if e.stderr is None else e.stderr for e in estimates])
-        best, candidates = select_law(t, values, stderr)
+        unit = estimates[0].unit
+        quantity = quantity_of(unit, spec.quantity)
+        best, candidates = select_law(t, values, stderr, candidates_for(quantity))
         if spec.form is not None:
             needed = FORMS[spec.form] or 2
             if len(members) < needed:
@@ -41,16 +52,20 @@ def fit_laws(
             true = published(t)
             deviation = float(np.max(np.abs(values - true)) / np.max(np.abs(true)))
             law_deviation = largest_deviation(best, published, t)
+        determined = any(e.identifiable for e in estimates)
+        about = (quantity, name, unit, float(t.min()), float(t.max()))
         laws[name] = LawResult(
             parameter=name,
-            unit=estimates[0].unit,
+            unit=unit,
             law=best,
             candidates=candidates,
             selected=spec.form is None,
             published=published,
             deviation=deviation,
             law_deviation=law_deviation,
-            determined=any(e.identifiable for e in estimates),
+            determined=determined,
+            doubts=doubts_about(best, *about) if determined else (),
+            published_doubts=doubts_about(published, *about) if published is not None else (),
         )
     return laws, notes
 

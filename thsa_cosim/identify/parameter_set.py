@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.identify.results import LawResult, PointResult
-from thsa_cosim.laws import Law
+from thsa_cosim.laws import Law, largest_deviation
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.ssv import ParameterSet
 
@@ -29,11 +31,17 @@ def law_values(parameter: Parameter, law: Law, fmu: FmuDescription) -> dict[str,
     """Start values of the block that holds ``law``; None if the FMU or the form has no such block."""
     block = law_block(parameter.variable, fmu)
     proportional = parameter.to_variable(0.0) == 0.0
-    if block is None or law.form == "spline" or not proportional:
+    if block is None or not law.fits_block or not proportional:
         return None
     factor = parameter.to_variable(1.0)
     values = law.block_values(block)
     return {name: value if ".beta" in name else value * factor for name, value in values.items()}
+
+
+def _held(law: LawResult) -> Law:
+    """The law itself, or for a Vogel law the best of its candidates that a ``TemperatureLaw`` block can hold."""
+    able = (c for c in law.candidates if c.fits_block)
+    return next(able, law.law) if law.law.form == "vogel" else law.law
 
 
 def parameter_set(
@@ -49,8 +57,15 @@ def parameter_set(
     for parameter in space.parameters:
         found = [p.parameters[parameter.name] for p in points if parameter.name in p.parameters]
         law = laws.get(parameter.name)
-        from_law = law_values(parameter, law.law, fmu) if law is not None else None
-        if from_law is not None:
+        held = None if law is None else _held(law)
+        from_law = None if held is None else law_values(parameter, held, fmu)
+        if from_law is not None and held is not None and law is not None:
+            if held is not law.law:
+                t = np.array([p.temperature_degC for p in points if p.temperature_degC is not None])
+                notes.append(
+                    f"{parameter.name} is in the parameter set as a {held.form} law, because a TemperatureLaw block"
+                    f" holds no {law.law.form} law: up to {100 * largest_deviation(held, law.law, t):.2g} % away."
+                )
             values.update(from_law)
         elif len(found) == 1:
             values.update(point_values(parameter, found[0].value, fmu))

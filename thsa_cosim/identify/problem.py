@@ -73,7 +73,7 @@ class Given:
 class PointProblem:
     """The recordings at one temperature (or all of them) and the parameters they share.
 
-    ``error`` is the f of equation 6 that is minimised, ``also`` those that are reported beside it.
+    ``error`` is the f of equation 6 that is minimised, ``also`` those that are also reported.
     """
 
     label: str

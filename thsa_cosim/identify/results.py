@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from thsa_cosim.inspection import Inspection, Trust
-from thsa_cosim.laws import Law
+from thsa_cosim.laws import Doubt, Law
 from thsa_cosim.search import Generation, LocalSearch
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.ssv import ParameterSet
@@ -131,6 +131,10 @@ class LawResult:
     """The same for the fitted law at the points' temperatures."""
     determined: bool = True
     """False if the data determine the parameter at none of the points: the law is then a fit to noise."""
+    doubts: tuple[Doubt, ...] = ()
+    """What the law does between the points' temperatures that its material does not."""
+    published_doubts: tuple[Doubt, ...] = ()
+    """The same of the published law."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from thsa_cosim.recordings.outliers import Mask
 from thsa_cosim.signals import FloatArray
 
 _PILE = 8.0
-"""So many times more samples lie on a limit than on the busiest level beside it."""
+"""So many times more samples lie on a limit than on the busiest level next to it."""
 _LEAST_CLIPPED = 8
 _COMMANDED = 3e-4
 """Noise of an input, in shares of its range, below which it is a command rather than measured."""
@@ -43,7 +43,7 @@ def clipped(channel: Channel) -> Iterator[Finding]:
 
 
 def _piles_up(values: FloatArray, limit: float, channel: Channel) -> bool:
-    """Whether more samples lie on the limit, one after the other, than noise puts on any value beside it."""
+    """Whether more samples lie on the limit, one after the other, than noise puts on any value next to it."""
     at = values == limit
     count = int(np.sum(at))
     if count < _LEAST_CLIPPED:

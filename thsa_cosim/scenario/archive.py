@@ -13,7 +13,7 @@ from thsa_cosim.scenario.system_schema import ModelTable
 
 
 def write_system(scenario: Path, output: Path | None) -> Path:
-    """Write the system that the tables of ``scenario`` describe; default beside it, with the ending ``.ssp``.
+    """Write the system that the tables of ``scenario`` describe; default next to it, with the ending ``.ssp``.
 
     Raises ScenarioError or FmuError in one sentence.
     """

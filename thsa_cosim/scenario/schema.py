@@ -23,12 +23,17 @@ class LawTable(Table):
     """
 
     form: str | None = None
-    """constant, linear, quadratic, cubic, exponential, double-exponential or spline; left out: chosen by
-    corrected AIC."""
+    """constant, linear, quadratic, cubic, exponential, double-exponential, copper, vogel or spline; left out: chosen
+    by corrected AIC, copper for resistances and vogel for friction among the candidates."""
     published: list[float] | None = None
     """Coefficients of a curve to compare with, from α0 up, or α1, β1, α2, β2."""
     published_form: str | None = None
     """Its form, if it is not ``form``."""
+    quantity: (
+        Literal["winding-resistance", "magnet-flux", "viscous-friction", "coulomb-friction", "none"] | None
+    ) = None
+    """The material whose behaviour over temperature the law is compared with; left out: as the unit suggests (ohm, Wb,
+    N.m/(rad/s), N/(m/s), N, N.m). "none": no comparison."""
 
     @property
     def compared_form(self) -> str | None:

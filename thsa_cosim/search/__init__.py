@@ -42,6 +42,7 @@ from thsa_cosim.search.polish import PolishResult, PolishSettings, confirm, poli
 from thsa_cosim.search.profile import CHI2_95, Profile, profile
 from thsa_cosim.search.uncertainty import (
     Uncertainty,
+    andrews_bandwidth,
     estimate_uncertainty,
     long_run_covariance,
     with_given,
@@ -68,6 +69,7 @@ __all__ = [
     "Residuals",
     "Uncertainty",
     "agreement",
+    "andrews_bandwidth",
     "answer",
     "confirm",
     "difference_columns",

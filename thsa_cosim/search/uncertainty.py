@@ -57,12 +57,17 @@ def andrews_bandwidth(scores: FloatArray) -> int:
 
 
 def long_run_covariance(scores: FloatArray, lags: int) -> FloatArray:
-    """Σ over k and l of weighted products of scores (N, n): (n, n), Bartlett weights up to ``lags``."""
-    total: FloatArray = scores.T @ scores
-    for lag in range(1, lags + 1):
-        product = scores[lag:].T @ scores[:-lag]
-        total += (1.0 - lag / (lags + 1.0)) * (product + product.T)
-    return total
+    """Σ over k and l of weighted products of scores (N, n): (n, n), Bartlett weights up to ``lags``.
+
+    As the products of the sums over every window of ``lags`` + 1 samples, which count a pair once per window that
+    holds both: the same weights, at a cost that does not grow with the lags.
+    """
+    width = lags + 1
+    running = np.zeros((len(scores) + 2 * lags + 1, scores.shape[1]))
+    np.cumsum(scores, axis=0, out=running[width : width + len(scores)])
+    running[width + len(scores) :] = running[width + len(scores) - 1]
+    windows = running[width:] - running[:-width]
+    return np.asarray(windows.T @ windows / width)
 
 
 def estimate_uncertainty(

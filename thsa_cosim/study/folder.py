@@ -37,7 +37,7 @@ def claim_folder(
 ) -> bool:
     """Create ``folder``, or check that it holds the same study; True if it is continued.
 
-    ``identity`` maps keys to plain JSON values; its ``kind`` is one of them. ``about`` is kept beside it for readers,
+    ``identity`` maps keys to plain JSON values; its ``kind`` is one of them. ``about`` is kept next to it for readers,
     as it was last given, and takes no part in the comparison. Raises InputError when the folder belongs to another
     study (the sentence names a key and both values), holds something else, or cannot be written.
     """

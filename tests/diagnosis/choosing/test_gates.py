@@ -45,6 +45,15 @@ def test_each_gate_refuses_and_says_why(name: str):
     assert found == between + says
 
 
+def test_what_is_small_beside_the_first_effect_must_leave_nothing_to_be_seen():
+    """A wrong effect may take up part of another one's misfit; it does not take up all of it."""
+    small = replace(PASSES, signal_share=0.001, share=0.9, visible=False)
+    says = "windage:motor explains less than 10 % of what the declared model left in any signal"
+    assert objection(small, LIMIT, False) == ""
+    assert objection(replace(small, share=0.899), LIMIT, False) == says
+    assert objection(replace(small, visible=True), LIMIT, False) == says
+
+
 def test_a_further_effect_has_to_explain_more():
     assert "explains 19 % of what is left, less than 20 %" in objection(
         replace(PASSES, share=0.19), LIMIT, False

@@ -22,7 +22,7 @@ class EffectParameter:
 
     ``dimension`` is a product of powers of the slot's scales (``"F/V^2"``; ``"1"`` for a plain number, or a unit
     such as ``"s"``); ``typical``, ``lower``, ``upper`` and ``starts`` are multiples of it. A coefficient makes the
-    effect vanish at its ``neutral`` value and acts nearly linearly; a shape parameter only matters beside it and
+    effect vanish at its ``neutral`` value and acts nearly linearly; a shape parameter only matters next to it and
     is tried from every one of ``starts``. ``scanned`` shapes are wave numbers whose starts come from a periodogram
     of the residual besides.
     """

@@ -63,7 +63,7 @@ def _block(slot: Slot, members: Sequence[Candidate], values: Mapping[str, float]
 
 
 def write_extended(folder: Path, name: str, source: str) -> Path:
-    """Write ``<folder>/<name>.mo``; its folder holds nothing else that a Modelica compiler would load beside it."""
+    """Write ``<folder>/<name>.mo``; its folder holds nothing else that a Modelica compiler would load with it."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.mo"
     path.write_text(source, encoding="utf-8")

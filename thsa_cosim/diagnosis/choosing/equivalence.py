@@ -1,4 +1,4 @@
-"""Which effects these recordings cannot tell apart: principal angles between what they would do to the outputs.
+"""Which effects these recordings cannot distinguish: principal angles between what they would do to the outputs.
 
 The responses of the candidates, less what the declared parameters imitate, span one plane each; the smallest principal
 angle between two planes (A. Bjorck, G. Golub, Mathematics of Computation 27 (1973) 579) says how alike they are. An
@@ -18,7 +18,7 @@ from thsa_cosim.signals import FloatArray
 
 
 def equivalence(found: Attribution) -> tuple[EquivalenceClass, ...]:
-    """Classes of candidates that the fit recordings cannot tell apart at an ordinary size, closest first.
+    """Classes of candidates that the fit recordings cannot distinguish at an ordinary size, closest first.
 
     Two candidates are alike if what one of ordinary size (its ``typical`` coefficients) does beyond the other gains
     less than chance does; within a class every two are. What would drown in chance by itself is in no class.

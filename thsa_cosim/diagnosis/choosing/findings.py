@@ -13,6 +13,7 @@ from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown
 from thsa_cosim.diagnosis.results import FoundEffect, Judged, Value
+from thsa_cosim.signals import FloatArray
 
 #: An error above this share of its value leaves it open; one above this share of the drawing's is the drawing's.
 CLEAR, NO_MORE = 1.0 / 3.0, 0.95
@@ -22,14 +23,35 @@ NO_MACHINE = Machine({}, {})
 HUGE = 10.0
 
 
-def values_of(fit: Fit, *, declared: bool) -> dict[str, Value]:
-    """The declared parameters (or the others) of a fit with standard errors, widened by what it leaves."""
-    stderr = fit.stderr(fit.inflation)
+def values_of(fit: Fit, *, declared: bool, stderr: FloatArray | None = None) -> dict[str, Value]:
+    """The declared parameters (or the others) of a fit with standard errors ``stderr`` (n,).
+
+    Default: those of white residuals, widened by what it leaves; enough for what is only listed.
+    """
+    stderr = fit.stderr(fit.inflation) if stderr is None else stderr
     return {
         u.name: Value(float(x), u.unit, float(s), undetermined(u, float(x), float(s)))
         for u, x, s in zip(fit.unknowns.members, fit.vector, stderr, strict=True)
         if u.declared is declared
     }
+
+
+def between_rivals(found: Attribution, fit: Fit) -> FloatArray:
+    """(n,) how far the unknowns of ``fit`` part between the accepted effects and their rivals, in their units.
+
+    Each of them may be the true one, and bends the declared parameters in its own way: the root of the mean square
+    over equally likely rivals. 0 for an effect's own parameters, which only mean something if it is the one.
+    """
+    variance = np.zeros(len(fit.unknowns.members))
+    declared = [k for k, u in enumerate(fit.unknowns.members) if u.declared]
+    names = [fit.unknowns.names[k] for k in declared]
+    for scored in found.accepted:
+        owner = _round_of(found, scored)
+        assert owner.accepted is not None
+        apart = [rival.fit.at(names) - owner.accepted.fit.at(names) for rival in owner.rivals]
+        if apart:
+            variance[declared] += np.sum(np.square(apart), axis=0) / (1 + len(apart))
+    return np.asarray(np.sqrt(variance))
 
 
 def undetermined(unknown: Unknown, value: float, stderr: float) -> str:
@@ -66,12 +88,17 @@ def vague(members: Sequence[Scored], values: Mapping[str, Value]) -> dict[str, V
     return found
 
 
-def found_effects(found: Attribution, fit: Fit, machine: Machine = NO_MACHINE) -> tuple[FoundEffect, ...]:
-    """The accepted effects with the values of the extended model; variants and places of one effect are one."""
+def found_effects(
+    found: Attribution, fit: Fit, machine: Machine = NO_MACHINE, stderr: FloatArray | None = None
+) -> tuple[FoundEffect, ...]:
+    """The accepted effects with the values of the extended model; variants and places of one effect are one.
+
+    ``stderr`` (n,): of the unknowns of ``fit``, as in `values_of`.
+    """
     merged: dict[str, list[Scored]] = {}
     for scored in found.accepted:
         merged.setdefault(scored.candidate.effect.name, []).append(scored)
-    values = values_of(fit, declared=False)
+    values = values_of(fit, declared=False, stderr=stderr)
     effects = []
     for members in merged.values():
         owner = _round_of(found, members[0])

@@ -20,8 +20,8 @@ SIGMAS = 3.0
 #: The share of the structure left that a first and a further effect must explain on the held-out recordings.
 FIRST_SHARE, NEXT_SHARE = 0.15, 0.2
 #: A further effect must explain this share of what the declared model left in some channel, or it may be the misfit of
-#: the first one.
-TOTAL_SHARE = 0.1
+#: the first one; or else nearly all that is left, so that nothing is visible any more: a misfit has not its form.
+TOTAL_SHARE, NEARLY_ALL = 0.1, 0.9
 #: Structure below this many standard deviations of the noise (rms over all channels) is not worth an effect.
 SMALLEST_STRUCTURE = 0.08
 #: If the best candidate is not believed, others are tried that gain this share of what it does, at most so many.
@@ -34,6 +34,7 @@ class Evidence:
 
     ``left``: mean squared structure of the held-out residuals without it, in variances of the noise. ``share``: how
     much of that it explains; ``signal_share``: of what the declared model left in the signal that gains most.
+    ``visible``: whether a model with it leaves structure that is to be seen in some signal.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Evidence:
     left: float
     share: float
     signal_share: float
+    visible: bool = True
 
 
 def objection(evidence: Evidence, limit: float, first: bool) -> str:
@@ -56,7 +58,8 @@ def objection(evidence: Evidence, limit: float, first: bool) -> str:
         return "what is left is too small against the noise to be worth an effect"
     if evidence.share < wanted:
         return f"{name} explains {100 * evidence.share:.0f} % of what is left, less than {100 * wanted:.0f} %"
-    if evidence.signal_share < TOTAL_SHARE:
+    explains_all = evidence.share >= NEARLY_ALL and not evidence.visible
+    if evidence.signal_share < TOTAL_SHARE and not explains_all:
         return f"{name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left in any signal"
     return ""
 
@@ -81,7 +84,7 @@ def near_best(scored: Sequence[Scored]) -> list[Scored]:
 
 
 def insignificant(choice: Scored) -> str:
-    """Why a fit cannot be told from a model without the effect, or "".
+    """Why a fit cannot be distinguished from a model without the effect, or "".
 
     Wald's test of all its coefficients together: one of them may well be zero. What the recordings say is widened by
     what they leave unexplained; what the drawing says is not.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from thsa_cosim.diagnosis.choosing.gates import (
     SIGMAS,
     SMALLEST_STRUCTURE,
+    TOTAL_SHARE,
     Evidence,
     insignificant,
     near_best,
@@ -16,9 +17,10 @@ from thsa_cosim.diagnosis.choosing.gates import (
 )
 from thsa_cosim.diagnosis.choosing.score import Scored, go_on, polish, score
 from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE, is_visible
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
-from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency
+from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, errors
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
 
@@ -32,6 +34,9 @@ REFINED, WORTH, STARTS = 6, 0.03, 2
 #: Once an effect leaves no structure, only those that promise this share of its gain are refined as rivals; and only
 #: those that reach this share of the best gain in two iterations are refined further.
 RIVAL_WORTH = 0.3
+#: A small further effect that explains this share of what is left is fitted with all parameters before it is judged:
+#: what the first one's parameters have taken up of it counts for it as well.
+HALF = 0.5
 
 Say = Callable[[str], None]
 
@@ -100,6 +105,7 @@ class Selection:
             left=self.weights.left(self.held),
             share=one.share,
             signal_share=signal_share(trials, base, self.held, one.validate),
+            visible=is_visible(errors(trials, self.weights.plain(one.validate, "validate")), VISIBLE_BESIDE),
         )
 
     def choose(
@@ -113,10 +119,14 @@ class Selection:
         doubtful: Scored | None = None
         for one in near_best(scored):
             evidence = self.evidence(one)
+            small = evidence.signal_share < TOTAL_SHARE and evidence.share >= HALF
+            whole = small and not first and not beside
+            if whole:
+                one = self._whole(one)
+                evidence = self.evidence(one)
             why = objection_beside(evidence, limit) if beside else objection(evidence, limit, first)
             if not why:
-                self.say(f"fitting {one.candidate.name} with all parameters")
-                one = polish(self.bench, one, self.current, self.held)
+                one = one if whole else self._whole(one)
                 why = insignificant(one)
                 if not why and (name := out_of_range(one.fit)):
                     why = f"{one.candidate.name}: it drives the declared parameter {name} to the end of its range"
@@ -151,6 +161,10 @@ class Selection:
             if self._ties(polished, winner):
                 rivals[name] = polished
         return tuple(rivals.values())
+
+    def _whole(self, one: Scored) -> Scored:
+        self.say(f"fitting {one.candidate.name} with all parameters")
+        return polish(self.bench, one, self.current, self.held)
 
     def _go_on(self, one: Scored) -> Scored:
         return go_on(self.bench, one, self.current, self.held)

@@ -1,4 +1,4 @@
-"""A diagnosis as result.json (the contract of the command line) and the files beside it."""
+"""A diagnosis as result.json (the contract of the command line) and the files next to it."""
 
 import json
 import math

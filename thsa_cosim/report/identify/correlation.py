@@ -1,4 +1,4 @@
-"""Which parameters the data cannot tell apart: correlations of the estimates, and profile likelihoods."""
+"""Which parameters the data cannot distinguish: correlations of the estimates, and profile likelihoods."""
 
 from itertools import combinations
 

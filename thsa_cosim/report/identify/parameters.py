@@ -4,9 +4,10 @@ import numpy as np
 
 from thsa_cosim.laws import Law
 from thsa_cosim.report.folder import Json
+from thsa_cosim.report.identify.doubts import LawDoubts, doubt_sentences
 from thsa_cosim.report.parts import chart
 from thsa_cosim.report.parts.chart import Chart
-from thsa_cosim.report.parts.content import Block, Cell, Column, Figure, Section, Table
+from thsa_cosim.report.parts.content import Block, Cell, Column, Figure, Section, Table, Text
 from thsa_cosim.report.parts.text import DASH, bound_text, degrees, number, percent, plus_minus, text_cell
 
 
@@ -19,6 +20,10 @@ def parameters(result: Json, prefix: str = "") -> Section | None:
     laws: Json = result.get("laws", {})
     if laws:
         blocks.append(_laws_table(laws))
+        blocks += [
+            Text(sentence[0].upper() + sentence[1:], "bad" if sentence.startswith("warning") else "")
+            for sentence in doubt_sentences({name: LawDoubts.read(law) for name, law in laws.items()})
+        ]
     blocks.append(_points_table(points))
     title = "Parameters over temperature" if laws else "Parameters"
     return Section(f"{prefix}parameters", title, tuple(blocks))

@@ -168,11 +168,15 @@ def _law(law: LawResult, result: IdentifyResult) -> dict[str, Any]:
         "covariance": None if law.law.covariance is None else law.law.covariance.tolist(),
         "chi2": law.law.chi2,
         "identifiable": law.determined,
+        "doubts": [asdict(doubt) for doubt in law.doubts],
     }
     if law.law.knots:
         content["knots"] = list(law.law.knots)
     if law.published is not None:
-        content["published"] = _coefficients(law.published)
+        content["published"] = {
+            **_coefficients(law.published),
+            "doubts": [asdict(doubt) for doubt in law.published_doubts],
+        }
         content["largest_deviation"] = {"points": law.deviation, "law": law.law_deviation}
     return content
 

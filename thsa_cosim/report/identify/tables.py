@@ -7,7 +7,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from thsa_cosim.identify.results import ForceBalance, IdentifyResult, PointResult
+from thsa_cosim.identify.results import ForceBalance, IdentifyResult, LawResult, PointResult
+from thsa_cosim.report.identify.doubts import LawDoubts, doubt_sentences
 from thsa_cosim.report.inspection import print_trust
 from thsa_cosim.report.parts.text import number, percent
 from thsa_cosim.report.simulate.tables import error_cells
@@ -17,6 +18,8 @@ def print_identify(console: Console, result: IdentifyResult) -> None:
     """Print laws, points and errors of an identification."""
     if result.laws:
         console.print(laws_table(result))
+        for sentence in doubt_sentences({name: _law_doubts(law) for name, law in result.laws.items()}):
+            console.print(Text(sentence), highlight=False)
     console.print(points_table(result))
     for sentence in search_sentences(result.points):
         console.print(Text(sentence), highlight=False)
@@ -59,6 +62,13 @@ def laws_table(result: IdentifyResult) -> Table:
             percent(law.law_deviation) if law.determined else "–",
         )
     return table
+
+
+def _law_doubts(law: LawResult) -> LawDoubts:
+    return LawDoubts(
+        [(d.kind, d.severity, d.text) for d in law.doubts],
+        [(d.kind, d.severity, d.text) for d in law.published_doubts],
+    )
 
 
 def points_table(result: IdentifyResult) -> Table:

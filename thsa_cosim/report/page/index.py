@@ -14,7 +14,7 @@ from thsa_cosim.report.page.diagram import boxes
 
 @dataclass(frozen=True)
 class Entry:
-    """One step: what it was for, the ``words`` of its command, what came out, how long it took [s], its page.
+    """One step: what it was for, the ``words`` of its command, its result, how long it took [s], its page.
 
     ``picture`` is a PNG file that shows what came out; ``effects`` what a diagnosis found, by name.
     """

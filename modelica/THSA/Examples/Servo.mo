@@ -29,12 +29,12 @@ model Servo "Geared servo that swings a pendulum: position law, direct-current m
     "Slot: heating of winding and magnets";
   replaceable THSA.Effects.ConstantTorqueConstant torqueEffect constrainedby THSA.Interfaces.TorqueConstantEffect
     "Slot: torque constant";
-  replaceable THSA.Effects.NoFriction motorEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
-    constrainedby THSA.Interfaces.FrictionEffect
-    "Slot: friction and torques at the motor, seen at the output shaft";
   replaceable THSA.Effects.NoFriction gearEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
     constrainedby THSA.Interfaces.FrictionEffect
     "Slot: losses of the gear";
+  replaceable THSA.Effects.NoFriction motorEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
+    constrainedby THSA.Interfaces.FrictionEffect
+    "Slot: friction and torques at the motor, seen at the output shaft";
   replaceable THSA.Effects.NoFriction bearingEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
     constrainedby THSA.Interfaces.FrictionEffect
     "Slot: friction of the output shaft's bearing";
@@ -43,7 +43,7 @@ model Servo "Geared servo that swings a pendulum: position law, direct-current m
   THSA.Units.Current i_m(nominal=1) "Current";
   THSA.Units.Torque tau_m(nominal=0.1) "Torque of the motor at the output shaft";
   THSA.Units.Torque tau_g(nominal=0.1) "Torque of gravity";
-  THSA.Units.Torque tau_t(nominal=0.1) "Torque through the gear, mean of both sides";
+  THSA.Units.Torque tau_t(nominal=0.1) "Torque that the motor's shaft passes to the gear";
 initial equation
   phi = q_start;
   omega = 0;
@@ -72,7 +72,7 @@ equation
   motorEffect.v = omega;
   motorEffect.s = friction.s;
   motorEffect.z = i_g*phi;
-  motorEffect.N = tau_m;
+  motorEffect.N = tau_t;
   gearEffect.v = omega;
   gearEffect.s = friction.s;
   gearEffect.z = phi;
@@ -87,7 +87,8 @@ equation
 <p>A servo with a direct-current motor and a gear holds a mass m at the end of an arm l: L di/dt = u &minus; R i &minus; K_t
 &omega; while the torque is enabled; with it disabled the terminals are open, the current dies out, and the pendulum
 falls against friction alone. All quantities of the motor are seen at the output shaft.</p>
-<p>tau_t is what the gear would carry without losses of its own: the motor's torque less what accelerates the rotor. The
+<p>tau_t, the load of the gear and of the motor's bearings, is the motor's torque less what accelerates the rotor, as it
+would be without losses of the gear; the load of the output shaft's bearing is the pendulum's weight as a torque. The
 defaults are those of a small servo's data sheet (stall torque by stall current, supply by stall current).</p></html>"),
     Icon(graphics={Rectangle(extent={{-90,90},{-20,30}}, lineColor={0,0,0}, fillColor={128,128,255}, fillPattern=FillPattern.Solid),
       Line(points={{-55,60},{30,-50}}, color={0,0,0}, thickness=1),

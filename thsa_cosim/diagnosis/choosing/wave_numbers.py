@@ -18,7 +18,7 @@ from thsa_cosim.signals import FloatArray, Signals
 _BLOCK = 512
 _PEAKS = 3
 #: Periods per revolution that are looked at on a shaft; along a path: periods per largest excursion.
-_HARMONICS = np.arange(1.0, 61.0)
+_HARMONICS = np.arange(1.0, 145.0)
 _PERIODS = np.arange(4.0, 200.0, 0.25)
 
 

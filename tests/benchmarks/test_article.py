@@ -1,6 +1,8 @@
-"""The article's rows: each number of ``docs/article.md`` that a short run can hold."""
+"""The article's rows: each number of ``docs/article.md``, by a short run or (nightly) by its command."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,77 @@ import thsa_cosim as tc
 
 ROOT = Path(__file__).parents[2]
 SCENARIOS = ROOT / "scenarios"
+DOCS = ROOT / "docs"
+sys.path.append(str(ROOT / "benchmarks"))
+import article_numbers as numbers
+from article import differences
+from article_page import ABSENT, CONTRADICTED, REPRODUCED, page
+
+STORED = json.loads((DOCS / "article" / "numbers.json").read_text(encoding="utf-8"))
+
+
+def test_the_page_is_that_of_the_stored_numbers() -> None:
+    """``python benchmarks/article.py`` writes both."""
+    assert (DOCS / "article.md").read_text(encoding="utf-8") == page(STORED)
+
+
+def test_every_row_has_a_verdict_and_every_picture_is_there() -> None:
+    text = (DOCS / "article.md").read_text(encoding="utf-8")
+    rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| ") and "claim" not in line]
+    assert len(rows) > 40
+    assert {row[3] for row in rows} == {REPRODUCED, CONTRADICTED, ABSENT}
+    for name in ("fig7", "fig8", "fig10", "fig11", "tables", "population"):
+        assert f"(article/{name}.png)" in text
+        assert 10_000 < (DOCS / "article" / f"{name}.png").stat().st_size < 150_000
+
+
+def test_numbers_without_a_study_are_the_stored_ones() -> None:
+    """Laws against copper and the bench's friction, and the recorded responses."""
+    now = json.loads(json.dumps(numbers.laws_numbers()))
+    assert differences(STORED["laws"], now) == []
+    recorded = {name: numbers.response(name) for name in ("tuned_at_25", "optimized")}
+    assert differences(STORED["recorded"], recorded) == []
+
+
+def test_a_number_that_moved_is_told() -> None:
+    changed = json.loads(json.dumps(STORED))
+    changed["table4"]["after"]["K_p"] *= 1.05
+    changed["identified"]["R_s"]["form"] = "quadratic"
+    del changed["copper_loss"]["sigma"]
+    assert sorted(line.split(":")[0] for line in differences(STORED, changed)) == [
+        "/copper_loss",
+        "/identified/R_s/form",
+        "/table4/after/K_p",
+    ]
+
+
+def test_stored_numbers_support_the_verdicts() -> None:
+    """What the page calls reproduced lies within the noise or the digits that the article prints."""
+    laws, table4, identified = STORED["laws"], STORED["table4"], STORED["identified"]
+    assert laws["R_s_m30"] == pytest.approx(0.498)
+    assert laws["R_s_copper_m30"] == pytest.approx(1.51, abs=0.005)
+    assert laws["b_g_share_m30"] == pytest.approx(2e-6, rel=0.2)
+    assert 0.42 <= table4["before"]["rise_time"] <= 0.45
+    assert table4["before"]["steady_state_error"] == pytest.approx(0.0022, abs=3e-4)
+    assert table4["article"]["rise_time"] == pytest.approx(0.31, abs=0.015)
+    assert STORED["tuned_at_25"]["after"]["K_p"] == pytest.approx(0.12, rel=0.05)
+    assert STORED["tuned_at_25"]["after"]["K_i"] == pytest.approx(0.45, rel=0.1)
+    assert STORED["current_alone"]["R_s"]["stderr"] == pytest.approx(0.056, rel=0.1)
+    assert identified["R_s"]["stderr_m30"] == pytest.approx(0.0041, rel=0.1)
+    for name, one in identified.items():
+        assert abs(one["m30"] - one["published_m30"]) < 3.0 * one["stderr_m30"], name
+        assert one["identifiable"] == (name != "b_g")
+    loss = STORED["copper_loss"]
+    of_law = loss["formula"] * identified["R_s"]["stderr_m30"] / identified["R_s"]["m30"]
+    assert abs(loss["balance"] - loss["formula"]) < 3.0 * np.hypot(loss["sigma"], of_law)
+
+
+@pytest.mark.nightly
+def test_the_command_finds_the_stored_numbers_again(tmp_path: Path) -> None:
+    command = [sys.executable, str(ROOT / "benchmarks" / "article.py"), "--studies", str(tmp_path), "--check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "0 numbers differ" in done.stdout
 
 
 @pytest.mark.parametrize("figure", ["fig10", "fig11"])
@@ -23,5 +96,7 @@ def test_the_identified_laws_meet_the_articles_validation(figure: str, tmp_path:
         measured = signals[f"{name} [{unit}]"]["measured"]
         error = recording["error"][name]
         assert error["nrmse"] <= limit
+        name_of = {"fig10": "tuned_at_25", "fig11": "optimized"}[figure]
+        assert error["nrmse"] == pytest.approx(STORED["validation"][name_of][name]["range"], rel=0.01)
         assert error["rmse"] / np.sqrt(np.mean(np.square(measured))) <= limit
         assert error["rmse"] == pytest.approx(error["noise"], rel=0.1)  # noise is all that is left

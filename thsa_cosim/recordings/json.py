@@ -34,9 +34,11 @@ def _parts(path: Path, content: Any) -> tuple[dict[str, Sequence[Any]], dict[str
             f"{path}: holds {len(tables)} lists of samples; write one file for each of them."
         )
     constants = {n: v for n, v in whole.items() if isinstance(v, int | float)}
+    columns: dict[str, Sequence[Any]]
     if tables:
         names = dict.fromkeys(name for sample in tables[0] for name in sample)
-        return {name: [sample.get(name) for sample in tables[0]] for name in names}, constants
+        columns = {name: [sample.get(name) for sample in tables[0]] for name in names}
+        return columns, constants
     columns = {n: v for n, v in whole.items() if isinstance(v, list)}
     lengths = {n: len(v) for n, v in columns.items()}
     if len(set(lengths.values())) > 1:

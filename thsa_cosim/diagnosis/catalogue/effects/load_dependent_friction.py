@@ -26,7 +26,9 @@ EFFECT = Effect(
     variants=(
         _variant(EffectParameter("mu", "1", 0.01, "friction per load", lower=0.0, upper=0.9), beside=False),
         _variant(
-            EffectParameter("mu_S", "1", 0.01, "breakaway part of the friction per load", lower=0.0, upper=0.9),
+            EffectParameter(
+                "mu_S", "1", 0.01, "breakaway part of the friction per load", lower=0.0, upper=0.9
+            ),
             EffectParameter(
                 "v_S",
                 "V",

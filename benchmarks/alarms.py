@@ -39,7 +39,9 @@ def main() -> None:
         ):
             counts = [year(draw((quantities, RECORDINGS))).sum() for _ in range(given.units)]
             error = np.std(counts, ddof=1) / np.sqrt(given.units)
-            print(f"{quantities:3d} quantities, {name}: {np.mean(counts):.2f} +- {error:.2f} false alarms a unit and year")
+            print(
+                f"{quantities:3d} quantities, {name}: {np.mean(counts):.2f} +- {error:.2f} false alarms a unit and year"
+            )
     for kind in ("jump", "drift"):
         for size in (2.0, 4.0, 6.0):
             waited = []
@@ -50,8 +52,14 @@ def main() -> None:
                 found = [
                     w
                     for w in range(RECORDINGS)
-                    if (abs(jump_of(values[0, : RECORDINGS + w + 1])[0] or 0.0) > limits(RECORDINGS + w + 1, 4)[0])
-                    or (abs(drift_of(values[0, : RECORDINGS + w + 1])[0] or 0.0) > limits(RECORDINGS + w + 1, 4)[1])
+                    if (
+                        abs(jump_of(values[0, : RECORDINGS + w + 1])[0] or 0.0)
+                        > limits(RECORDINGS + w + 1, 4)[0]
+                    )
+                    or (
+                        abs(drift_of(values[0, : RECORDINGS + w + 1])[0] or 0.0)
+                        > limits(RECORDINGS + w + 1, 4)[1]
+                    )
                 ]
                 waited.append(found[0] + 1 if found else RECORDINGS)
             what = f"{size:g} sigma" + ("" if kind == "jump" else " in half a year")

@@ -41,8 +41,8 @@ def list_command(folder: Path | None, as_json: bool) -> None:
 def compare(folders: tuple[Path, ...], output: Path | None, as_json: bool, watched: bool) -> None:
     """Compare study folders with the first one: parameters, effects, errors and settings that differ.
 
-    Each difference is given with its standard error and with z, the difference divided by that error. With --watch, each
-    quantity of the latest study is compared with what the earlier ones predict, and its trend is tested.
+    Each difference is given with its standard error and with z, the difference divided by that error. With --watch,
+    each quantity of the latest study is compared with what the earlier ones predict, and its trend is tested.
     """
     from thsa_cosim.report.compare import compare as compared
     from thsa_cosim.report.compare.page import write_comparison

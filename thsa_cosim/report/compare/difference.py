@@ -134,7 +134,9 @@ class Comparison:
             other = "no other value" if moved else "no value"
             parts.append(f"{other} differs beyond chance")
         text = "; ".join(parts) or "no uncertainty is known, so no difference can be tested"
-        return text[0].upper() + text[1:] + (f" (|z| > {self.limit:.3g})." if tested else ".")
+        if text.startswith(("only ", "no ")):  # a name stays as it is
+            text = text[0].upper() + text[1:]
+        return text + (f" (|z| > {self.limit:.3g})." if tested else ".")
 
     def _tested(self) -> dict[str, int]:
         """The quantities whose difference has an uncertainty, with how many differences each has."""

@@ -28,8 +28,8 @@ FEWEST = 4
 class Trend:
     """A quantity over studies 0 … n - 1: ``slope`` per study with its standard error, and the latest beside the mean.
 
-    ``expected`` ± ``scatter``: what the earlier studies predict for the latest one. ``jump`` and ``drift`` are t values,
-    ``limits`` theirs; None where the studies do not scatter at all.
+    ``expected`` ± ``scatter``: what the earlier studies predict for the latest one. ``jump`` and ``drift`` are t
+    values, ``limits`` theirs; None where the studies do not scatter at all.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Trend:
 
     @property
     def alarm(self) -> str:
-        """"jump", "drift" or ""."""
+        """ "jump", "drift" or ""."""
         if self.jump is not None and abs(self.jump) > self.limits[0]:
             return "jump"
         return "drift" if self.drift is not None and abs(self.drift) > self.limits[1] else ""
@@ -130,5 +130,7 @@ def _sentence(t: Trend) -> str:
     place = f" at {t.at}" if t.at else ""
     unit = f" {t.unit}" if t.unit not in ("", "1") else ""
     if t.alarm == "jump":
-        return f"{t.name}{place} is {t.latest:.4g}{unit}, where {t.expected:.4g} ± {t.scatter:.2g} was expected"
+        return (
+            f"{t.name}{place} is {t.latest:.4g}{unit}, where {t.expected:.4g} ± {t.scatter:.2g} was expected"
+        )
     return f"{t.name}{place} drifts by {t.slope:.3g} ± {t.slope_stderr:.2g}{unit} per study"

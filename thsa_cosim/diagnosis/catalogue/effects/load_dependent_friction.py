@@ -21,7 +21,7 @@ EFFECT = Effect(
     name="load-dependent-friction",
     title="Friction in proportion to the load that the pair carries",
     physics="F = (mu + mu_S exp(-(v/v_S)^2) + mu_2 |N|) |N| sgn(v)",
-    source="Coulomb; roller-screw efficiency, e.g. Lemor, SNAME 1996; Duclusaud et al., ICRA 2025 (gears, models m3 to m6)",
+    source="Coulomb; Lemor, SNAME 1996 (roller screws); Duclusaud et al., ICRA 2025 (gears, models m3 to m6)",
     signature="current grows with the load beyond the declared lossless transmission",
     variants=(
         _variant(EffectParameter("mu", "1", 0.01, "friction per load", lower=0.0, upper=0.9), beside=False),

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thsa_cosim import units
 from thsa_cosim.errors import UnitError
 from thsa_cosim.units import base_exponents, conversion, convert, is_unit, same_dimension
 
@@ -111,3 +112,34 @@ def test_base_units_as_in_the_fmi(unit, exponents, factor, offset):
     found = base_exponents(unit)
     assert found[0] == exponents
     assert found[1:] == pytest.approx((factor, offset))
+
+
+_SPELLED = (*units._COMMON, *units._SI, *units._SCALED, "N.m.s/(rad.K2)", "Wb/K3", "1/K", "1/(s.K)", "s-1", "1/s",
+            "N*m", "mm/s2", "m2/s2", "V/(m/s)", "m/(s.s)", "N.m/(rad/(s.K))", "kg.mm2")  # fmt: skip
+
+
+def _answers(unit: str, others: tuple[str, ...]) -> list[object]:
+    found: list[object] = [units.base_exponents(unit), units.is_unit(unit)]
+    for other in others:
+        try:
+            found.append((units.conversion(unit, other), units.same_dimension(unit, other)))
+        except UnitError as error:
+            found.append((str(error), units.same_dimension(unit, other)))
+    return found
+
+
+def test_well_known_symbols_are_read_as_pint_reads_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    units.conversion.cache_clear()
+    ours = {unit: _answers(unit, _SPELLED[::4]) for unit in _SPELLED}
+    assert sum(units._plain(unit) is not None for unit in _SPELLED) > 50
+    monkeypatch.setattr(units, "_plain", lambda _unit: None)
+    units.conversion.cache_clear()
+    for unit in _SPELLED:
+        assert ours[unit] == _answers(unit, _SPELLED[::4]), unit
+
+
+@pytest.mark.parametrize(
+    "text", ["", "N.", "N..m", "(N.m", "N.m)", "N m", "1/", "2.N", "N/m/", "Nx", "N.(m", "mm999"]
+)
+def test_spellings_that_are_not_plain_are_left_to_pint(text: str) -> None:
+    assert units._plain(text) is None

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,27 +14,26 @@ import numpy as np
 
 from thsa_cosim import __version__
 from thsa_cosim.batch import Experiment, Job, Outcome
-from thsa_cosim.costs import nrmse, rmse
-from thsa_cosim.errors import ScenarioError, StudyError
-from thsa_cosim.inspection import Residual, Trust, judge
+from thsa_cosim.errors import StudyError
+from thsa_cosim.inspection import Inspection, Residual, Trust, judge, misfits
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario
 from thsa_cosim.signals import FloatArray, Signals
-from thsa_cosim.study import Place, Study, describe, study_identity
+from thsa_cosim.study import (
+    ChannelError,
+    Engine,
+    Place,
+    Progress,
+    Request,
+    Study,
+    Want,
+    communication_points,
+    compare,
+    describe,
+    study_identity,
+)
 
 RESULT = "result.json"
-
-
-@dataclass(frozen=True)
-class ChannelFit:
-    """How well one output follows its recording; ``rmse`` and ``noise`` in ``unit``."""
-
-    rmse: float
-    nrmse: float
-    """rmse over the range of the measured signal."""
-    noise: float
-    """1 σ of the recording's noise: the scenario's, else an estimate from the recording."""
-    unit: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class SimulatedRecording:
     """All recorded channels at the recording's samples."""
     simulated: Signals | None
     """The FMU's outputs at the communication points, in its units."""
-    errors: Mapping[str, ChannelFit]
+    errors: Mapping[str, ChannelError]
     status: str
     reason: str
     duration_s: float
@@ -65,6 +65,19 @@ class SimulateResult:
     """reason -> number of recordings"""
     files: tuple[Path, ...]
     notes: tuple[str, ...] = ()
+
+    @cached_property
+    def data(self) -> Inspection:
+        """What is wrong with the recordings, and which slip of a signal explains what the model leaves of them."""
+        found = self.scenario.data
+        known = {(f.recording, f.channel, f.kind) for f in found.findings}
+        slips = [
+            f
+            for r in self.recordings
+            for f in misfits(_residuals(self.scenario, r), self.scenario.file_units)
+        ]
+        slips = [f for f in slips if (f.recording, f.channel, f.kind) not in known]
+        return Inspection.of((*found.findings, *slips), found.repairs)
 
     @property
     def trust(self) -> Trust:
@@ -83,7 +96,7 @@ class SimulateResult:
             "failures": dict(self.failures),
             "fmu": {"path": str(self.scenario.fmu.path), "sha256": self.scenario.fmu.sha256},
             "version": __version__,
-            "data": self.scenario.data.to_dict(),
+            "data": self.data.to_dict(),
             "trust": self.trust.to_dict(),
             "notes": list(self.notes),
             "recordings": [
@@ -122,24 +135,51 @@ def simulate(scenario: Scenario, place: Place) -> SimulateResult:
     StudyError
         If every simulation failed.
     """
-    cases = _cases(scenario)
-    done = 0
+    recordings = _Recordings(tuple(_cases(scenario)))
+    told = 0
 
-    def count(_index: int, _outcome: Outcome) -> None:
-        nonlocal done
-        done += 1
-        place.say(f"{done} of {len(cases)} recordings simulated")
+    def count(progress: Progress) -> None:
+        nonlocal told
+        if progress.runs > told:
+            told = progress.runs
+            place.say(f"{told} of {recordings.size} recordings simulated")
 
-    experiments = [experiment for *_, experiment in cases]
+    experiments = [experiment for *_, experiment in recordings.cases]
     useful = min(place.executor.workers, max(len(experiments), 1))
     place = replace(place, executor=replace(place.executor, workers=useful))
     with Study.open(place, study_identity(scenario, "simulate"), describe(scenario)) as study:
         with study.open_runner(scenario.simulation, experiments) as runner:
-            outcomes = runner.run([Job(e.name) for *_, e in cases], count)
+            request = Request(Want.SIGNALS, np.zeros((1, 0)))
+            (outcomes,) = Engine(runner, on_progress=count).ask(recordings, request).outcomes
             notes = (*scenario.notes, *runner.notes)
-        result = _written(place.folder, scenario, cases, outcomes, notes)
+        result = _written(place.folder, scenario, recordings.cases, outcomes, notes)
         study.complete()
     return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Recordings:
+    """Every recording with its role as a simulation at the start values: a problem without parameters."""
+
+    cases: tuple[tuple[Recording, str, Experiment], ...]
+    label: str = "recordings"
+    names: tuple[str, ...] = ()
+    samples: int = 1
+
+    @property
+    def size(self) -> int:
+        return len(self.cases)
+
+    def decode(self, vectors: FloatArray) -> FloatArray:
+        return vectors
+
+    def jobs(
+        self, want: Want, values: Sequence[Mapping[str, float]], overrides: Mapping[str, float]
+    ) -> list[Job]:
+        return [Job(experiment.name, dict(overrides)) for *_, experiment in self.cases]
+
+    def judge(self, want: Want, outcomes: Sequence[Outcome]) -> tuple[float, FloatArray]:
+        return np.inf, np.zeros(0)
 
 
 def _written(
@@ -180,7 +220,7 @@ def _cases(scenario: Scenario) -> list[tuple[Recording, str, Experiment]]:
                 fmu=scenario.fmu.path,
                 inputs=scenario.drive(recording),
                 outputs=scenario.outputs,
-                time=_grid(scenario, recording),
+                time=communication_points(scenario, recording),
                 fixed={**fixed, **start, **recording.start},
                 tolerance=scenario.simulation.tolerance,
             )
@@ -188,43 +228,17 @@ def _cases(scenario: Scenario) -> list[tuple[Recording, str, Experiment]]:
     return cases
 
 
-def _grid(scenario: Scenario, recording: Recording) -> FloatArray:
-    """Communication points (n,) s: the recording's samples, or every ``simulation.step``."""
-    time, step = recording.signals.time, scenario.simulation.step
-    if step is None:
-        return time
-    count = int(np.floor((time[-1] - time[0]) / step * (1.0 + 1e-12))) + 1
-    if count < 2:
-        raise ScenarioError(
-            f"{scenario.path}: simulation.step = {step:g} s is longer than {recording.path}; lower it."
-        )
-    return np.asarray(time[0] + step * np.arange(count))
-
-
 def _compare(scenario: Scenario, recording: Recording, role: str, outcome: Outcome) -> SimulatedRecording:
-    measured = recording.signals.select(scenario.measured)
-    errors: dict[str, ChannelFit] = {}
+    errors: Mapping[str, ChannelError] = {}
     if outcome.signals is not None:
-        reached = measured.time <= outcome.signals.time[-1] * (1.0 + 1e-12) + 1e-9
-        reached &= measured.time >= recording.compared.time[0]
-        samples = measured.time[reached]
-        at_samples = outcome.signals.select(measured.names).resample(samples)
-        for name in measured.names:
-            spec = scenario.cost.channels.get(name)
-            given = spec.noise if spec is not None else None
-            kept = reached & ~recording.left_out.get(name, np.zeros(reached.shape, dtype=np.bool_))
-            simulated = at_samples[name][kept[reached]]
-            errors[name] = ChannelFit(
-                rmse=rmse(measured[name][kept], simulated),
-                nrmse=nrmse(measured[name][kept], simulated),
-                noise=given if given is not None else recording.noise.get(name, 0.0),
-                unit=measured.units[name],
-            )
+        own = {name: channel.given_noise for name, channel in scenario.cost.channels.items()}
+        given = {name: noise for name, noise in own.items() if noise is not None}
+        errors = compare(recording, role, scenario.measured, given, outcome.signals).errors
     return SimulatedRecording(
         name=recording.name,
         role=role,
         temperature_degC=recording.temperature_degC,
-        measured=measured,
+        measured=recording.signals.select(scenario.measured),
         simulated=outcome.signals,
         errors=errors,
         status=str(outcome.status),
@@ -257,6 +271,9 @@ def _residuals(scenario: Scenario, found: SimulatedRecording) -> list[Residual]:
                 noise,
                 found.errors[name].unit,
                 {n: inputs[n] for n in inputs.names},
+                time[kept],
+                simulated,
+                np.empty((int(np.sum(kept)), 0)),  # nothing is fitted here
             )
         )
     return residuals

@@ -2,7 +2,10 @@ within THSA;
 model Actuator "THSA in closed velocity loop, every loss a law over temperature"
   THSA.Interfaces.RealInput v_cmd(unit="m/s") "Velocity command";
   THSA.Interfaces.RealInput F_load(unit="N") "Aerodynamic force, positive opposes positive velocity";
-  THSA.Interfaces.RealInput T_amb(unit="degC", start=25, min=-90, max=150) "Temperature of motor, gearbox and screw";
+  THSA.Interfaces.RealInput T_amb(unit="degC", start=25, min=-90, max=150) "Temperature of the surroundings, and of every part without its own";
+  THSA.Interfaces.RealInput T_motor(unit="degC", start=-300, min=-300, max=200) "Temperature of the motor; below absolute zero: not connected, T_amb";
+  THSA.Interfaces.RealInput T_gearbox(unit="degC", start=-300, min=-300, max=200) "Temperature of the gearbox; below absolute zero: not connected, T_amb";
+  THSA.Interfaces.RealInput T_screw(unit="degC", start=-300, min=-300, max=200) "Temperature of screw and nut; below absolute zero: not connected, T_amb";
   THSA.Interfaces.RealOutput v(unit="m/s", nominal=1e-3) "Measured output velocity";
   THSA.Interfaces.RealOutput x(unit="m", nominal=1e-2) "Output position";
   THSA.Interfaces.RealOutput w_m(unit="rad/s", nominal=10) "Motor speed";
@@ -10,7 +13,9 @@ model Actuator "THSA in closed velocity loop, every loss a law over temperature"
   THSA.Interfaces.RealOutput u_q(unit="V", nominal=10) "Voltage of the q axis";
   THSA.Controllers.VelocityController velocityController "Velocity loop, the law to tune";
   THSA.Controllers.CurrentController currentController "Current loop";
-  THSA.Motor motor(du=inverterEffect.du, g_R=windingEffect.g_R, g_psi=windingEffect.g_psi, g_t=torqueEffect.g_t, g_e=torqueEffect.g_e,
+  replaceable THSA.Thermal.GivenTemperatures temperatures constrainedby THSA.Interfaces.PartTemperatures
+    "Slot: temperatures of the parts";
+  THSA.Motor motor(T_w=temperatures.winding, du=inverterEffect.du, g_R=windingEffect.g_R, g_psi=windingEffect.g_psi, g_t=torqueEffect.g_t, g_e=torqueEffect.g_e,
     tau_f=motorEffect.F) "Motor";
   THSA.Gearbox gearbox(tau_f=gearboxEffect.F) "Gearbox";
   THSA.NoBack noBack "No-back device";
@@ -59,9 +64,17 @@ equation
   connect(nut.flange_b, stabilizer.flange);
   connect(stabilizer.flange, sensor.flange);
   connect(F_load, stabilizer.F_load);
-  connect(T_amb, motor.T);
-  connect(T_amb, gearbox.T);
-  connect(T_amb, nut.T);
+  connect(T_amb, temperatures.T_amb);
+  connect(T_motor, temperatures.T_motor);
+  connect(T_gearbox, temperatures.T_gearbox);
+  connect(T_screw, temperatures.T_screw);
+  temperatures.P_winding = motor.P_co;
+  temperatures.P_motor = motor.P_f;
+  temperatures.P_gearbox = gearbox.P_f + noBack.P_f;
+  temperatures.P_screw = nut.P_f;
+  connect(temperatures.motor, motor.T);
+  connect(temperatures.gearbox, gearbox.T);
+  connect(temperatures.screw, nut.T);
   velocitySensorEffect.u = sensor.y;
   v = sensor.y + velocitySensorEffect.d;
   x = stabilizer.x;
@@ -93,7 +106,9 @@ equation
   annotation(
     experiment(StartTime=0, StopTime=1.2, Tolerance=1e-6, Interval=1e-3),
     Documentation(info="<html><p>The whole actuator. It starts at rest, in equilibrium under the load at the start, the
-screw's angle at zero: x = &minus;F_load/k_s.</p></html>"),
+screw's angle at zero: x = &minus;F_load/k_s.</p>
+<p>Every part is at <code>T_amb</code> until its own temperature is connected; in <code>ThermalActuator</code> a thermal
+network computes what is not connected.</p></html>"),
     Icon(graphics={Rectangle(extent={{-100,-100},{100,100}}, lineColor={0,60,100}, fillColor={255,255,255}, fillPattern=FillPattern.Solid),
       Text(extent={{-90,40},{90,-40}}, textString="THSA", textColor={0,60,100}),
       Text(extent={{-100,140},{100,105}}, textString="%name", textColor={0,0,255})}));

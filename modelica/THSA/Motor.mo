@@ -1,10 +1,11 @@
 within THSA;
 model Motor "Permanent-magnet synchronous motor in the power-invariant dq frame, with rotor and friction"
   THSA.Interfaces.RealInput u_q(unit="V") "Voltage of the q axis";
-  THSA.Interfaces.RealInput T(unit="degC") "Temperature of winding, magnets and bearings";
+  THSA.Interfaces.RealInput T(unit="degC") "Temperature of magnets and bearings, and of the winding unless T_w is given";
   THSA.Interfaces.RealOutput i_q(unit="A", start=0, fixed=true, nominal=10) "Current of the q axis";
   THSA.Interfaces.RealOutput w_m(unit="rad/s", start=0, fixed=true, nominal=10) "Speed of the rotor";
   THSA.Interfaces.RotationalFlange flange "Shaft";
+  input THSA.Units.Temperature T_w = T "Temperature of the winding";
   input THSA.Units.Voltage du = 0 "Voltage that the inverter adds";
   input THSA.Units.Ratio g_R = 0 "Relative change of the winding resistance";
   input THSA.Units.Ratio g_psi = 0 "Relative change of the magnets' flux";
@@ -39,7 +40,7 @@ model Motor "Permanent-magnet synchronous motor in the power-invariant dq frame,
   THSA.Units.Power P_co "Copper loss";
   THSA.Units.Power P_f "Friction loss";
 equation
-  connect(T, R_s.T);
+  R_s.T = T_w;
   connect(T, psi_pm.T);
   connect(T, T_fm.T);
   connect(T, b_m.T);

@@ -17,8 +17,13 @@ package Units "Types with SI units"
   type Inductance = Real(final quantity="Inductance", final unit="H") "Inductance";
   type Power = Real(final quantity="Power", final unit="W") "Power";
   type Temperature = Real(final quantity="ThermodynamicTemperature", final unit="degC") "Temperature in degrees Celsius";
+  type AbsoluteTemperature = Real(final quantity="ThermodynamicTemperature", final unit="K", min=0) "Temperature of a heat port";
+  type HeatFlowRate = Real(final quantity="Power", final unit="W") "Heat flow rate";
+  type HeatCapacity = Real(final quantity="HeatCapacity", final unit="J/K") "Heat capacity";
+  type ThermalConductance = Real(final quantity="ThermalConductance", final unit="W/K") "Thermal conductance";
+  type Energy = Real(final quantity="Energy", final unit="J") "Energy";
   type TorqueConstant = Real(final quantity="ElectricalTorqueConstant", final unit="N.m/A") "Torque constant";
   type Ratio = Real(final quantity="Ratio", final unit="1") "Dimensionless ratio";
   annotation(Documentation(info="<html><p>Quantities as in <code>Modelica.Units.SI</code>, except that temperature is
-in degrees Celsius, the unit of the published laws.</p></html>"));
+in degrees Celsius, the unit of the published laws; only heat ports have it in kelvin.</p></html>"));
 end Units;

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from thsa_cosim.batch import Job, Outcome, Status
+from thsa_cosim.batch.runner import OnOutcome
 from thsa_cosim.costs.channels import Channel
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate, candidates_of
 from thsa_cosim.diagnosis.catalogue.effect import Effect
@@ -16,8 +17,8 @@ from thsa_cosim.diagnosis.catalogue.slots import Slot
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
-from thsa_cosim.identify.problem import Case
 from thsa_cosim.signals import Signals
+from thsa_cosim.study import Case
 
 TIME = np.arange(1601) * 5e-3
 NOISE = {"i": 0.02, "u": 0.05}
@@ -73,7 +74,7 @@ class Drive:
             current = current + (force if candidate.slot is MOTOR else force / RATIO)
         return {"i": current, "u": values["R"] * current + values["K"] * own["v"]}
 
-    def run(self, jobs: Sequence[Job], on_outcome: object = None) -> list[Outcome]:
+    def run(self, jobs: Sequence[Job], on_outcome: OnOutcome | None = None) -> list[Outcome]:
         self.ran += jobs
         outcomes = []
         for job in jobs:
@@ -81,6 +82,9 @@ class Drive:
             found = self.outputs(job.values, part)
             residual = [(found[n] - self.measured[part][n]) / NOISE[n] for n in NOISE]
             outcomes.append(Outcome(Status.OK, "", None, np.concatenate(residual), 0.0, ""))
+        for index, outcome in enumerate(outcomes):
+            if on_outcome is not None:
+                on_outcome(index, outcome)
         return outcomes
 
     def close(self) -> None:

@@ -204,7 +204,12 @@ def test_description_declares_what_an_importer_needs(built):
         "i_q": "A",
         "u_q": "V",
     }
-    assert {v.name: v.unit for v in description.inputs} == {"v_cmd": "m/s", "F_load": "N", "T_amb": "degC"}
+    temperatures = ("T_amb", "T_motor", "T_gearbox", "T_screw")
+    assert {v.name: v.unit for v in description.inputs} == {
+        "v_cmd": "m/s",
+        "F_load": "N",
+        **dict.fromkeys(temperatures, "degC"),
+    }
     for inner in (
         "motor.P_co",
         "motor.friction.F_f",
@@ -310,6 +315,8 @@ def test_stale_fmu_is_noticed(tmp_path, capsys):
     assert set(found) == {
         "THSA.fmu",
         "THSA_FeedForward.fmu",
+        "THSA_Thermal.fmu",
+        "THSA_Redundant.fmu",
         "Plant.fmu",
         "Gearbox.fmu",
         "Screw.fmu",

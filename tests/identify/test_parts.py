@@ -1,8 +1,6 @@
-"""The parts of an identification, each on its own: interleaving, channels, comparison, laws, study folder."""
+"""The parts of an identification, each on its own: channels, laws, parameter sets."""
 
 import pickle
-import threading
-import time
 from pathlib import Path
 
 import numpy as np
@@ -11,95 +9,15 @@ import pytest
 from thsa_cosim.costs import Channel, ResidualReducer, TermsReducer
 from thsa_cosim.errors import InputError
 from thsa_cosim.fmu import DefaultExperiment, FmuDescription, Variable
-from thsa_cosim.identify.compare import summarise
-from thsa_cosim.identify.interleave import interleave
 from thsa_cosim.identify.over_temperature import fit_laws, values_at
 from thsa_cosim.identify.parameter_set import law_values, parameter_set
-from thsa_cosim.identify.results import ChannelError, Comparison, Estimate, PointResult
+from thsa_cosim.identify.results import Estimate, PointResult
 from thsa_cosim.laws import published_law
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.report.parameter_files import modelica_record
 from thsa_cosim.scenario import LawTable
 from thsa_cosim.signals import Signals
 from thsa_cosim.ssv import ParameterSet
-
-
-def countdown(steps: int):
-    def task(ask):
-        return [ask(k) for k in range(steps)]
-
-    return task
-
-
-def test_interleaving_answers_all_waiting_tasks_in_one_batch() -> None:
-    batches = []
-
-    def serve(requests):
-        batches.append(list(requests))
-        return [index * 100 + request for index, request in requests]
-
-    found = dict(interleave([countdown(3), countdown(1), countdown(2)], serve))
-    assert found == {0: [0, 1, 2], 1: [100], 2: [200, 201]}
-    assert batches == [[(0, 0), (1, 0), (2, 0)], [(0, 1), (2, 1)], [(0, 2)]]
-
-
-def test_interleaving_serves_in_the_calling_thread() -> None:
-    threads = set()
-
-    def serve(requests):
-        threads.add(threading.current_thread())
-        return [0 for _ in requests]
-
-    list(interleave([countdown(2), countdown(2)], serve))
-    assert threads == {threading.current_thread()}
-
-
-def test_an_error_in_one_task_ends_the_others_and_is_raised() -> None:
-    ended = []
-
-    def patient(ask):
-        try:
-            while True:
-                ask(0)
-        finally:
-            ended.append(True)
-
-    def broken(ask):
-        ask(0)
-        raise ZeroDivisionError("one")
-
-    with pytest.raises(ZeroDivisionError, match="one"):
-        list(interleave([patient, broken, patient], lambda requests: [0 for _ in requests]))
-    assert ended == [True, True]
-    assert not [t for t in threading.enumerate() if t.name.startswith("search-")]
-
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
-def test_an_interrupted_batch_keeps_what_was_yielded(error: type[BaseException]) -> None:
-    def serve(requests):
-        if len(requests) == 1:
-            raise error
-        return [0 for _ in requests]
-
-    found = {}
-
-    def consume() -> None:
-        found.update((index, result) for index, result in interleave([countdown(1), countdown(5)], serve))
-
-    with pytest.raises(error):
-        consume()
-    assert found == {0: [0]}
-    time.sleep(0.05)
-    assert not [t for t in threading.enumerate() if t.name.startswith("search-")]
-
-
-def test_a_task_without_questions_finishes() -> None:
-    assert dict(interleave([countdown(0), countdown(1)], lambda requests: [7] * len(requests))) == {
-        0: [],
-        1: [7],
-    }
-    assert list(interleave([], lambda requests: [])) == []
-
 
 TIME = np.linspace(0.0, 1.0, 11)
 
@@ -120,29 +38,6 @@ def test_a_coarser_simulation_is_interpolated_onto_the_samples() -> None:
     channel = Channel("a", TIME, 2.0 * TIME, noise=1.0)
     coarse = Signals(TIME[::5], {"a": 2.0 * TIME[::5]})
     np.testing.assert_allclose(channel.residual(coarse), 0.0, atol=1e-12)
-
-
-def comparison(name: str, role: str, offset: float, noise: float, count: int) -> Comparison:
-    t = np.linspace(0.0, 1.0, count)
-    measured = Signals(t, {"a": np.sin(7.0 * t)}, {"a": "A"})
-    simulated = Signals(t, {"a": np.sin(7.0 * t) + offset}, {"a": "A"})
-    error = ChannelError(abs(offset), abs(offset) / np.ptp(measured["a"]), noise, "A", count)
-    return Comparison(name, role, 20.0, measured, simulated, {"a": error})
-
-
-def test_errors_over_recordings_weigh_by_samples() -> None:
-    errors = summarise(
-        [
-            comparison("x", "fit", 0.3, 0.1, 300),
-            comparison("y", "fit", -0.1, 0.5, 100),
-            comparison("z", "validate", 1.0, 1.0, 50),
-        ]
-    )
-    assert errors["fit"]["a"].rmse == pytest.approx(np.sqrt((300 * 0.09 + 100 * 0.01) / 400))
-    assert errors["fit"]["a"].noise == pytest.approx(np.sqrt((300 * 0.01 + 100 * 0.25) / 400))
-    assert errors["fit"]["a"].nrmse == pytest.approx(errors["fit"]["a"].rmse / 2.0, rel=0.01)
-    assert errors["validate"]["a"].samples == 50
-    assert summarise([]) == {"fit": {}, "validate": {}}
 
 
 def point(temperature: float | None, **values: float) -> PointResult:

@@ -12,13 +12,15 @@ from rich.console import Console
 
 from thsa_cosim import cli
 from thsa_cosim.batch import Job, Outcome, Status
+from thsa_cosim.batch.runner import OnOutcome
 from thsa_cosim.costs.channels import Channel, ResidualReducer
-from thsa_cosim.identify.problem import Case, PointProblem
+from thsa_cosim.identify.problem import PointProblem
 from thsa_cosim.identify.sensitivity import _at, sensitivity
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.report.identify.sensitivity import print_sensitivity
 from thsa_cosim.scenario import Executor, load
 from thsa_cosim.signals import Signals
+from thsa_cosim.study import Case, Engine
 
 ROOT = Path(__file__).parents[2]
 TIME = np.linspace(0.0, 1.0, 400)
@@ -36,7 +38,13 @@ class LinearRunner:
     def __init__(self, fails: bool = False) -> None:
         self.fails, self.jobs = fails, 0
 
-    def run(self, jobs: Sequence[Job]) -> list[Outcome]:
+    def run(self, jobs: Sequence[Job], on_outcome: OnOutcome) -> list[Outcome]:
+        found = self.simulate(jobs)
+        for index, outcome in enumerate(found):
+            on_outcome(index, outcome)
+        return found
+
+    def simulate(self, jobs: Sequence[Job]) -> list[Outcome]:
         self.jobs += len(jobs)
         reduce = ResidualReducer(point().cases[0].channels)
         if self.fails:
@@ -59,11 +67,11 @@ def point(names: str = "abc") -> PointProblem:
 
 def test_expected_errors_and_responses_are_those_of_linear_least_squares() -> None:
     class OnlyTwo(LinearRunner):
-        def run(self, jobs: Sequence[Job]) -> list[Outcome]:
-            return super().run([Job(j.experiment, {**j.values, "c": 0.0}) for j in jobs])
+        def simulate(self, jobs: Sequence[Job]) -> list[Outcome]:
+            return super().simulate([Job(j.experiment, {**j.values, "c": 0.0}) for j in jobs])
 
     runner = OnlyTwo()
-    found = _at(point("ab"), runner)
+    found = _at(point("ab"), Engine(runner))
     jacobian = np.zeros((2 * TIME.size, 2))
     jacobian[: TIME.size] = np.stack([TIME, TIME**2], axis=1) / NOISE["v"]
     jacobian[TIME.size :, 0] = 1.0 / NOISE["i"]
@@ -80,7 +88,7 @@ def test_expected_errors_and_responses_are_those_of_linear_least_squares() -> No
 
 
 def test_parameters_that_act_only_together_are_not_determined() -> None:
-    a, b, c = _at(point(), LinearRunner()).parameters
+    a, b, c = _at(point(), Engine(LinearRunner())).parameters
     assert a.stderr is not None
     assert b.stderr is None
     assert "combination of it with c" in b.reason
@@ -88,14 +96,14 @@ def test_parameters_that_act_only_together_are_not_determined() -> None:
 
 
 def test_start_values_that_cannot_be_simulated_are_said() -> None:
-    found = _at(point(), LinearRunner(fails=True))
+    found = _at(point(), Engine(LinearRunner(fails=True)))
     assert found.failure == "the process died by SIGSEGV"
     assert found.parameters == ()
 
 
 def test_points_share_a_table_with_the_range_over_them() -> None:
     out = Console(width=140, file=io.StringIO())
-    one = _at(point(), LinearRunner())
+    one = _at(point(), Engine(LinearRunner()))
     print_sensitivity(out, [one, replace(one, label="25 degC")])
     text = out.file.getvalue()
     assert "2 points from all to 25 degC" in text

@@ -4,6 +4,7 @@ import copy
 import datetime
 import shutil
 import string
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from thsa_cosim.errors import (
     ThsaCosimError,
     UnitError,
 )
+from thsa_cosim.fmu import read_description
 from thsa_cosim.scenario import KINDS, Scenario, load_scenario
 from thsa_cosim.ssv import ParameterSet, write_ssv
 
@@ -48,6 +50,16 @@ def sentence(folder, data, error=ThsaCosimError, **options):
     return message
 
 
+def test_a_temperature_that_starts_below_absolute_zero_needs_no_column() -> None:
+    fmu = read_description(ROOT / "fmus" / "THSA.fmu")
+    assert [v.name for v in fmu.inputs if v.may_stay_open] == ["T_motor", "T_gearbox", "T_screw"]
+    kelvin = replace(fmu.variables["T_motor"], unit="K", start=-1.0)
+    assert kelvin.may_stay_open
+    assert not replace(kelvin, start=0.0).may_stay_open
+    assert not replace(kelvin, causality="parameter").may_stay_open
+    assert not replace(kelvin, unit="m", start=-300.0).may_stay_open
+
+
 def test_a_valid_scenario_in_full(folder):
     scenario = load(folder, valid())
     assert (scenario.kind, scenario.title, scenario.seed) == ("identify", "small", 3)
@@ -64,7 +76,8 @@ def test_a_valid_scenario_in_full(folder):
     assert (law.form, law.published, law.compared_form) == ("linear", [1.2, 0.03], "linear")
     assert scenario.cost.channels["w_m"].noise == 0.2
     assert scenario.cost.channels["i_q"].weight == 2.0
-    assert (scenario.cost.start, scenario.cost.stop, scenario.cost.mask) == (0.0, 0.4, ((0.1, 0.12),))
+    window = scenario.cost.window
+    assert (window.start, window.stop, scenario.cost.mask) == (0.0, 0.4, [[0.1, 0.12]])
     assert (scenario.search.population, scenario.search.strategy) == (20, "best1bin")
     assert (scenario.search.mutation, scenario.search.crossover, scenario.search.generations) == (
         0.16,

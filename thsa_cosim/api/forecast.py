@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Outcome
-from thsa_cosim.identify.evaluate import planned_vectors
-from thsa_cosim.identify.problem import build_case
+from thsa_cosim.identify.problem import planned_vectors
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.scenario import AnyScenario, Executor, Scenario, SimulationTable, StagedScenario, TuneScenario
+from thsa_cosim.study import build_case
 from thsa_cosim.tune.problem import build_groups
 
 SAMPLE = 12

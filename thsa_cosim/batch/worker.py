@@ -9,6 +9,7 @@ just ends, and its supervisor cleans up.
 import contextlib
 import ctypes
 import gc
+import importlib
 import io
 import mmap
 import os
@@ -130,7 +131,9 @@ class Worker:
 
     def serve(self) -> None:
         """Run orders until told to stop."""
-        self._warm_up()
+        if self._setup.memory_limit is not None and self._setup.backend != "python":
+            with contextlib.suppress(Exception):  # what numba takes is none of the FMU's growth
+                importlib.import_module("thsa_cosim.fmu.compiled")
         gc.freeze()  # what the imports have made lives as long as the process
         if self._setup.memory_limit is not None:
             self._floor = limit_growth(self._setup.memory_limit)
@@ -150,12 +153,6 @@ class Worker:
                 return
         if self._live is not None:
             self._live.close()
-
-    def _warm_up(self) -> None:
-        """Load machine code before the first deadline starts to count."""
-        if self._setup.backend != "python":
-            with contextlib.suppress(Exception):
-                import thsa_cosim.fmu.compiled  # noqa: F401
 
     def _run(self, order: Order) -> Outcome:
         begin = time.perf_counter()
@@ -220,6 +217,7 @@ class Worker:
                 progress=self._progress[:4],
                 on_message=_to_stderr,
             )
+            plant.warm_up()
             self._plants[folder] = plant
         self._live = plant
         plant.input_mode = experiment.input_mode

@@ -37,9 +37,9 @@ from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import ChannelError, Comparison, DiagnosisResult, EmpiricalLaw
 from thsa_cosim.errors import StudyError
 from thsa_cosim.export.compile import this_platform
-from thsa_cosim.identify import Comparison as Compared
 from thsa_cosim.identify import ForceBalance, force_balance
 from thsa_cosim.scenario import DiagnoseSpec, Scenario
+from thsa_cosim.study import Comparison as Compared
 from thsa_cosim.study import Place, Study, describe, study_identity
 
 #: The folder of the superset inside a study.

@@ -75,7 +75,7 @@ def draft_from_columns(
     inputs = [v for v in fmu.inputs if v.is_float and not v.is_array and _is_name(v.name)]
     matches = match_columns([*inputs, *outputs], rest)
     taken = {match.variable.name for match in matches}
-    constant = tuple(v for v in inputs if v.name not in taken)
+    constant = tuple(v for v in inputs if v.name not in taken and not v.may_stay_open)
     unmatched_outputs = tuple(v for v in outputs if v.name not in taken)
     used = {match.column.name for match in matches}
     unmatched_columns = tuple(c for c in rest if c.name not in used)

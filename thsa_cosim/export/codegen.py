@@ -296,7 +296,9 @@ def _tables(model: CausalModel) -> str:
         return ", ".join(number(float(value)) for value in values or [0.0])
 
     def starts(kind: str) -> str:
-        chosen = {v.index: v.start or 0.0 for v in model.variables if v.kind == kind}
+        chosen = dict.fromkeys((v.index for v in model.variables if v.kind == kind), 0.0)
+        # aliases share the index, and have no start value of their own
+        chosen |= {v.index: v.start for v in model.variables if v.kind == kind and v.start is not None}
         return numbers([chosen[index] for index in sorted(chosen)])
 
     messages = [_quoted(f"{a.message} ({_short(a.place)})") for a in model.flat.assertions]

@@ -37,6 +37,9 @@ _ATTRIBUTES = (
 )
 
 
+_ABSOLUTE_ZERO = {"K": 0.0, "degC": -273.15, "degF": -459.67}
+
+
 @dataclass(frozen=True)
 class Variable:
     """One variable of an FMU; numbers are in ``unit``, ``None`` where the description is silent."""
@@ -75,6 +78,12 @@ class Variable:
     def is_float(self) -> bool:
         """Whether the value is a floating-point number."""
         return self.type in FLOAT_TYPES
+
+    @property
+    def may_stay_open(self) -> bool:
+        """Whether it is an input that needs no signal: a temperature that starts below absolute zero."""
+        zero = _ABSOLUTE_ZERO.get(self.unit or "")
+        return self.causality == "input" and None not in (zero, self.start) and self.start < zero  # type: ignore[operator]
 
 
 @dataclass(frozen=True)

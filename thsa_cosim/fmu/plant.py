@@ -20,7 +20,7 @@ from thsa_cosim.fmu.native import MessageSink
 from thsa_cosim.fmu.plan import Plan
 from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.fmu.stepping import check_names, step_through
-from thsa_cosim.fmu.trajectory import follow, is_offered, solver_tolerance
+from thsa_cosim.fmu.trajectory import follow, is_expected, is_offered, solver_tolerance
 from thsa_cosim.signals import FloatArray, Signals
 
 Kind = Literal["co-simulation", "model-exchange"]
@@ -73,7 +73,7 @@ class Plant:
             raise FmuError(
                 f"{description.path} is FMI 1.0 Model Exchange, which is not supported; export FMI 2.0."
             )
-        self.backend: Backend = backend or _default_backend()
+        self._backend = backend
         self.reuse: Reuse = reuse
         self.stepping: Stepping = stepping
         self.progress = np.zeros(4) if progress is None else progress
@@ -246,6 +246,18 @@ class Plant:
         instance.terminate()
         return signals
 
+    @property
+    def backend(self) -> Backend:
+        """What the loop over communication steps runs in; numba is looked for when it is first asked."""
+        if self._backend is None:
+            self._backend = _default_backend()
+        return self._backend
+
+    def warm_up(self) -> None:
+        """Import what runs will need besides the FMU, which then counts towards no deadline."""
+        if self.kind == "co-simulation" and not (self.stepping == "free" and is_expected(self.description)):
+            _ = self.backend
+
     def _new_instance(self) -> Instance:
         cls = Fmi2Instance if self.description.fmi_version == "2.0" else Fmi3Instance
         return cls(self.folder, self.description, self.kind, self._on_message)
@@ -273,7 +285,8 @@ class Plant:
     def _prepare_callback(self, instance: Instance, plan: Plan) -> None:
         if not isinstance(instance, Fmi3Instance) or self.kind != "co-simulation":
             return
-        if plan.mode != "intermediate" or plan.smooth is None:
+        in_one_call = self.stepping == "free" and is_offered(instance)
+        if plan.mode != "intermediate" or plan.smooth is None or in_one_call:
             instance.intermediate_update, instance.intermediate_references = 0, ()
             self._update = None
             return

@@ -164,11 +164,7 @@ def raised_inputs(description: FmuDescription, time: FloatArray) -> Signals | No
     By a tenth of the range or of the start value, or by the nominal value, whichever is declared.
     """
     ramp = np.clip(2.0 * (time - time[0]) / (time[-1] - time[0]), 0.0, 1.0)
-    values = {
-        v.name: (v.start or 0.0) + _amplitude(v) * ramp
-        for v in description.inputs
-        if v.is_float and not v.is_array and v.variability == "continuous"
-    }
+    values = {v.name: (v.start or 0.0) + _amplitude(v) * ramp for v in excitable(description)}
     return Signals(time, values) if values else None
 
 
@@ -180,9 +176,11 @@ _KNOTS = (
 
 
 def excitable(description: FmuDescription) -> tuple[Variable, ...]:
-    """Inputs that can run linearly."""
+    """Inputs that can run linearly, and that need a signal."""
     return tuple(
-        v for v in description.inputs if v.is_float and not v.is_array and v.variability == "continuous"
+        v
+        for v in description.inputs
+        if v.is_float and not v.is_array and v.variability == "continuous" and not v.may_stay_open
     )
 
 

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.instance import Instance, Phase
 from thsa_cosim.fmu.plan import Plan
 from thsa_cosim.fmu.segments import MERGED, Segments, segments
@@ -61,6 +62,11 @@ class Course:
         for name, array in arrays.items():
             setattr(self.struct, name, array.ctypes.data)
         self.signals: Signals | None = None
+
+
+def is_expected(description: FmuDescription) -> bool:
+    """Whether an FMU says that it comes from our exporter, so that ``is_offered`` will be true of its library."""
+    return description.tool.startswith("thsa")
 
 
 def is_offered(instance: Instance) -> bool:

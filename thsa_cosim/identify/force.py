@@ -5,10 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from thsa_cosim.identify.results import Comparison, ForceBalance
+from thsa_cosim.identify.results import ForceBalance
 from thsa_cosim.inverse_dynamics import force_residual, repeatability
 from thsa_cosim.scenario import ForceSpec
 from thsa_cosim.signals import FloatArray
+from thsa_cosim.study import Comparison
 
 
 def force_balance(

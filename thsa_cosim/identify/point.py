@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thsa_cosim.costs import TermsReducer
-from thsa_cosim.identify.evaluate import Reply, Request, Want
 from thsa_cosim.identify.problem import Given, PointProblem
 from thsa_cosim.identify.results import Estimate, PointResult, ProfileCurve
 from thsa_cosim.search import (
@@ -35,6 +34,7 @@ from thsa_cosim.search import (
 )
 from thsa_cosim.search.strategies import SearchMethod
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.study import Reply, Request, Want
 
 Ask = Callable[[Request], Reply]
 

@@ -2,55 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from thsa_cosim.batch import Experiment, Reducer, Wrapper
-from thsa_cosim.costs import window_mask
-from thsa_cosim.costs.channels import Channel
-from thsa_cosim.errors import ScenarioError
-from thsa_cosim.inverse_dynamics import low_pass
+from thsa_cosim.batch import Experiment, Job, Outcome
+from thsa_cosim.costs.channels import ResidualReducer, TermsReducer
+from thsa_cosim.costs.identification import error_terms
 from thsa_cosim.parameters import ParameterSpace
-from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario import Channel as ChannelSpec
-from thsa_cosim.scenario import Scenario, TemperaturePoint
-from thsa_cosim.signals import FloatArray, Signals
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """One recording as a simulation: ``inputs`` drive the FMU over ``time`` (n,) in s.
-
-    ``channels`` are fitted, within the cost's window; ``measured`` holds all samples after the lead-in.
-    ``fixed``: start values that every run has, in the FMU's units.
-    """
-
-    name: str
-    fmu: Path
-    inputs: Signals
-    time: FloatArray
-    fixed: Mapping[str, float]
-    channels: tuple[Channel, ...]
-    measured: Signals
-    temperature_degC: float | None
-    tolerance: float | None
-    wrapper: Wrapper | None = None
-
-    def experiment(self, name: str, reduce: Reducer | None) -> Experiment:
-        """The simulation under ``name`` with what the worker makes of its signals."""
-        return Experiment(
-            name=name,
-            fmu=self.fmu,
-            inputs=self.inputs,
-            outputs=self.measured.names,
-            time=self.time,
-            fixed=self.fixed,
-            tolerance=self.tolerance,
-            reduce=reduce,
-            wrapper=self.wrapper,
-        )
+from thsa_cosim.scenario import Scenario, SearchTable, TemperaturePoint
+from thsa_cosim.search import LocalSettings
+from thsa_cosim.signals import FloatArray
+from thsa_cosim.study import Case, Want, build_case, stacked
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +48,16 @@ class PointProblem:
     profile: tuple[str, ...] = ()
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return self.space.names
+
+    @property
+    def size(self) -> int:
+        """Number of recordings."""
+        return len(self.cases)
+
+    @property
     def channel_names(self) -> tuple[str, ...]:
         """Names of the fitted signals, in order."""
         return tuple(channel.name for channel in self.cases[0].channels)
@@ -107,82 +79,93 @@ class PointProblem:
             groups.append(slices)
         return groups
 
+    @property
+    def experiments(self) -> list[Experiment]:
+        """Per recording the simulation that returns its cost terms, and the one that returns its residuals."""
+        made = []
+        for case in self.cases:
+            made += [
+                case.experiment(_name(case, Want.TERMS), TermsReducer(case.channels, self.error)),
+                case.experiment(_name(case, Want.RESIDUALS), ResidualReducer(case.channels)),
+            ]
+        return made
 
-def build_case(scenario: Scenario, recording: Recording, fixed: Mapping[str, float]) -> Case:
-    """A recording as a simulation; ScenarioError if the cost's window leaves no sample of it."""
-    time = recording.signals.time
-    grid, step = time, scenario.simulation.step
-    if step is not None:
-        count = int(np.floor((time[-1] - time[0]) / step * (1.0 + 1e-12))) + 1
-        if count < 2:
-            raise ScenarioError(
-                f"{scenario.path}: simulation.step = {step:g} s is longer than {recording.path}; lower it."
+    def decode(self, vectors: FloatArray) -> FloatArray:
+        """Vectors (..., n) of the unit cube in the parameters' units."""
+        return self.space.physical(vectors)
+
+    def jobs(
+        self, want: Want, values: Sequence[Mapping[str, float]], overrides: Mapping[str, float]
+    ) -> list[Job]:
+        """One simulation per recording."""
+        return [
+            Job(
+                _name(case, want),
+                {**self.space.assignments(own, case.name), **overrides},
+                keep_signals=want is Want.SIGNALS,
             )
-        grid = time[0] + step * np.arange(count)
-    counted = _counted(scenario, time) & (time <= grid[-1] + 1e-9 * abs(grid[-1]))
-    counted &= time >= recording.compared.time[0]
-    if np.count_nonzero(counted) < 2:
-        raise ScenarioError(
-            f"{scenario.path}: cost.window and cost.mask leave no sample of {recording.name}; widen them."
-        )
-    channels = tuple(
-        _channel(scenario, recording, name, spec, counted) for name, spec in scenario.cost.channels.items()
-    )
-    return Case(
-        name=recording.name,
-        fmu=scenario.fmu.path,
-        inputs=scenario.drive(recording),
-        time=grid,
-        fixed={**fixed, **recording.start},
-        channels=channels,
-        measured=recording.compared.select(scenario.measured),
-        temperature_degC=recording.temperature_degC,
-        tolerance=scenario.simulation.tolerance,
-    )
+            for case, own in zip(self.cases, values, strict=True)
+        ]
+
+    def judge(self, want: Want, outcomes: Sequence[Outcome]) -> tuple[float, FloatArray]:
+        """Cost and its terms per channel (c,) over all recordings; infinite if one failed."""
+        if want is Want.TERMS and all(o.ok for o in outcomes):
+            terms = np.sum([o.reduced for o in outcomes if o.reduced is not None], axis=0)
+        elif want is Want.RESIDUALS and (residual := stacked(outcomes)) is not None:
+            terms = self._terms(residual)
+        else:
+            terms = np.full(len(self.channel_names), np.inf)
+        return float(np.sum(terms)), terms
+
+    def _terms(self, residual: FloatArray) -> FloatArray:
+        """Cost terms per channel (c,) of stacked residuals (N,)."""
+        total = np.zeros(len(self.channel_names))
+        for slices in self.groups:
+            parts = {name: residual[part] for name, part in zip(self.channel_names, slices, strict=True)}
+            total += list(error_terms(parts, self.error).values())
+        return total
 
 
-def _channel(
-    scenario: Scenario, recording: Recording, name: str, spec: ChannelSpec, counted: np.ndarray[Any, Any]
-) -> Channel:
-    """The samples of a channel that count; within a band every so many, so that they do not repeat each other."""
-    time, measured, every = recording.signals.time, recording.signals[name], 1
-    if spec.band is not None:
-        step = float(np.mean(np.diff(time)))
-        if 2.0 * spec.band * step >= 1.0:
-            raise ScenarioError(
-                f"{scenario.path}: cost.channels.{name}.band = {spec.band:g} Hz is above half the sampling rate of"
-                f" {recording.name}; lower it or leave it out."
-            )
-        try:
-            measured = low_pass(measured, spec.band, step)
-        except ValueError:
-            raise ScenarioError(
-                f"{scenario.path}: {recording.name} is too short for cost.channels.{name}.band; leave it out."
-            ) from None
-        every = max(1, int(1.0 / (2.5 * spec.band * step)))
-    if name in recording.left_out:
-        counted = counted & ~recording.left_out[name]
-        if np.count_nonzero(counted) < 2:
-            raise ScenarioError(
-                f"{scenario.path}: the repairs of {name!r} leave no sample of {recording.name}; leave out fewer."
-            )
-    return Channel(
-        name=name,
-        time=time[counted][::every],
-        measured=measured[counted][::every],
-        noise=scenario.noise(recording, name),
-        weight=spec.weight,
-        band=spec.band,
-    )
+def _name(case: Case, want: Want) -> str:
+    return f"fit/{case.name}" if want is Want.TERMS else f"fit/{case.name} (residuals)"
 
 
-def _counted(scenario: Scenario, time: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Which samples (n,) count: inside the window, outside every masked span; s after the first sample."""
-    elapsed = time - time[0]
-    counted = window_mask(elapsed, scenario.cost.start, scenario.cost.stop)
-    for begin, end in scenario.cost.mask:
-        counted &= ~window_mask(elapsed, begin, end)
-    return counted
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Recordings that are only scored, each with values of its own in the parameters' units."""
+
+    cases: tuple[Case, ...]
+    space: ParameterSpace
+    names: tuple[str, ...]
+    label: str = "held out"
+    samples: int = 1
+
+    @property
+    def size(self) -> int:
+        """Number of recordings."""
+        return len(self.cases)
+
+    @property
+    def experiments(self) -> list[Experiment]:
+        """Per recording the simulation that returns its signals."""
+        return [case.experiment(f"validate/{case.name}", None) for case in self.cases]
+
+    def decode(self, vectors: FloatArray) -> FloatArray:
+        """Values as they are."""
+        return vectors
+
+    def jobs(
+        self, want: Want, values: Sequence[Mapping[str, float]], overrides: Mapping[str, float]
+    ) -> list[Job]:
+        """One simulation per recording."""
+        return [
+            Job(f"validate/{case.name}", self.space.assignments(own) | dict(overrides), keep_signals=True)
+            for case, own in zip(self.cases, values, strict=True)
+        ]
+
+    def judge(self, want: Want, outcomes: Sequence[Outcome]) -> tuple[float, FloatArray]:
+        """Nothing is searched here: no cost."""
+        return np.inf, np.zeros(0)
 
 
 def build_point(scenario: Scenario, point: TemperaturePoint, given: Given | None = None) -> PointProblem:
@@ -197,3 +180,23 @@ def build_point(scenario: Scenario, point: TemperaturePoint, given: Given | None
         given=given,
         profile=tuple(scenario.search.profile),
     )
+
+
+def planned_vectors(search: SearchTable, dimension: int) -> int:
+    """Return how many vectors a search over ``dimension`` parameters may take.
+
+    Local searches are expected to agree, each after seven steps with one-sided differences; an evolution to take
+    all its generations, its polish six steps. Central differences, twice, end both.
+    """
+    end = 2 + 4 * dimension
+    if not search.polish:
+        return evolved_vectors(search) + 2
+    if search.method == "local-first":
+        settings = LocalSettings()
+        return settings.starts * (settings.hand + 7 * (dimension + 2)) + end
+    return evolved_vectors(search) + 6 * (dimension + 2) + end
+
+
+def evolved_vectors(search: SearchTable) -> int:
+    """Return how many vectors an evolution tries at most."""
+    return search.population * (search.generations + 1)

@@ -7,8 +7,9 @@ from pathlib import Path
 from thsa_cosim.inspection import Inspection, Trust
 from thsa_cosim.laws import Doubt, Law
 from thsa_cosim.search import Generation, LocalSearch
-from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.signals import FloatArray
 from thsa_cosim.ssv import ParameterSet
+from thsa_cosim.study import ChannelError, Comparison
 
 
 @dataclass(frozen=True)
@@ -48,29 +49,6 @@ class ProfileCurve:
     costs: FloatArray
     lower: float | None
     upper: float | None
-
-
-@dataclass(frozen=True)
-class ChannelError:
-    """How well a measured signal is met: rmse and noise (1 σ) in ``unit``, nrmse over the measured range."""
-
-    rmse: float
-    nrmse: float
-    noise: float
-    unit: str
-    samples: int
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Measured and simulated signals of one recording, each channel (n,) in the FMU variable's unit."""
-
-    recording: str
-    role: str
-    temperature_degC: float | None
-    measured: Signals
-    simulated: Signals
-    errors: Mapping[str, ChannelError]
 
 
 @dataclass(frozen=True)

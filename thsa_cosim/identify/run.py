@@ -5,30 +5,46 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 
+import numpy as np
+
 from thsa_cosim import __version__
-from thsa_cosim.batch import Experiment, Job, Journal, Runner
+from thsa_cosim.batch import Journal
 from thsa_cosim.errors import InputError, StudyError
-from thsa_cosim.identify.compare import case_residuals, compare, summarise
-from thsa_cosim.identify.evaluate import Evaluator, Reply, Request, residual_experiment, terms_experiment
 from thsa_cosim.identify.force import force_balance
-from thsa_cosim.identify.interleave import interleave
 from thsa_cosim.identify.over_temperature import fit_laws, values_at
 from thsa_cosim.identify.parameter_set import parameter_set
 from thsa_cosim.identify.point import PointSearch, search_point
-from thsa_cosim.identify.problem import Case, Given, PointProblem, build_case, build_point
-from thsa_cosim.identify.results import (
-    Comparison,
-    ForceBalance,
-    IdentifyResult,
-    LawResult,
-    PointResult,
+from thsa_cosim.identify.problem import (
+    Given,
+    HeldOut,
+    PointProblem,
+    build_point,
+    evolved_vectors,
+    planned_vectors,
 )
+from thsa_cosim.identify.results import ForceBalance, IdentifyResult, LawResult, PointResult
 from thsa_cosim.identify.silent import note_on, silent_parameters
 from thsa_cosim.inspection import Finding, Inspection, Residual, judge, misfits
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario
 from thsa_cosim.search import EvolutionSettings, Generation
-from thsa_cosim.study import Place, Study, describe, study_identity
+from thsa_cosim.study import (
+    Case,
+    Comparison,
+    Engine,
+    Place,
+    Reply,
+    Request,
+    Study,
+    Want,
+    build_case,
+    case_residuals,
+    compare_case,
+    describe,
+    interleave,
+    study_identity,
+    summarise,
+)
 
 JOURNAL = "journal.csv"
 
@@ -65,13 +81,14 @@ def identify(
         Journal.open(place.folder / JOURNAL, names, channels) as journal,
     ):
         try:
-            experiments = _experiments(points, held_out)
+            experiments = [e for point in points for e in point.experiments]
+            experiments += search.held_out().experiments
             with study.open_runner(scenario.simulation, experiments) as runner:
                 search.note(runner.notes)
-                evaluator = Evaluator(runner, journal, points, names, channels, place.on_progress)
-                search.try_parameters(evaluator)
-                search.search(evaluator)
-                search.validate(runner)
+                engine = Engine(runner, journal, place.on_progress)
+                search.try_parameters(engine)
+                search.search(engine)
+                search.validate(engine)
             study.complete()
         except KeyboardInterrupt:
             search.interrupted = True
@@ -97,24 +114,31 @@ class _Search:
         self._found: dict[int, PointSearch] = {}
         self._comparisons: list[Comparison] = []
         self._notes: list[str] = []
-        self._evaluator: Evaluator | None = None
+        self._engine: Engine | None = None
 
     def note(self, notes: Sequence[str]) -> None:
         """Take sentences for the result."""
         self._notes += notes
 
-    def try_parameters(self, evaluator: Evaluator) -> None:
+    def held_out(self, cases: Sequence[Case] | None = None) -> HeldOut:
+        """The held-out recordings, or some of them, as a problem."""
+        chosen = [case for case, _ in self._held_out] if cases is None else cases
+        space = self._scenario.parameters
+        return HeldOut(tuple(chosen), space, tuple(p.name for p in space.parameters))
+
+    def try_parameters(self, engine: Engine) -> None:
         """Name the parameters that do nothing, before any search."""
-        silent = silent_parameters(self._points[0], lambda request: evaluator.serve([(0, request)])[0])
+        first = self._points[0]
+        silent = silent_parameters(first, lambda request: engine.ask(first, request))
         if silent:
             sentences = note_on(silent)
             self.note(sentences)
             for sentence in sentences:
                 _log.warning(sentence)
 
-    def search(self, evaluator: Evaluator) -> None:
+    def search(self, engine: Engine) -> None:
         """Search all points at once; what is finished is kept whatever happens to the rest."""
-        self._evaluator = evaluator
+        self._engine = engine
         spec = self._scenario.search
         settings = EvolutionSettings(
             population=spec.population,
@@ -125,35 +149,42 @@ class _Search:
             seed=self._scenario.seed,
             tolerance=spec.tolerance,
         )
-        evaluator.plan(spec)
+        for point in self._points:
+            engine.plan(point, planned_vectors(spec, point.space.dimension))
+        engine.report()
 
         def task(index: int) -> Callable[[Callable[[Request], Reply]], PointSearch]:
+            point = self._points[index]
+
             def on_generation(generation: Generation) -> None:
-                evaluator.note_generation(index, generation.index)
+                engine.note_generation(generation.index)
 
             def on_evolution() -> None:
-                evaluator.expect_evolution(index, spec)
+                engine.plan(point, evolved_vectors(spec))
 
-            point = self._points[index]
             return lambda ask: search_point(
                 point, spec.method, settings, spec.polish, ask, on_generation, on_evolution
             )
 
         tasks = [task(index) for index in range(len(self._points))]
-        with closing(interleave(tasks, evaluator.serve)) as finished:
+
+        def serve(requests: Sequence[tuple[int, Request]]) -> list[Reply]:
+            return engine.serve([(self._points[k], request) for k, request in requests])
+
+        with closing(interleave(tasks, serve)) as finished:
             for index, found in finished:
                 self._found[index] = found
-                evaluator.finish_point(index)
+                engine.finish(self._points[index])
         if not any(found.result for found in self._found.values()):
             reason = next(iter(self._found.values())).reason
             raise StudyError(f"{self._scenario.path}: no simulation succeeded: {reason}")
 
-    def validate(self, runner: Runner) -> None:
+    def validate(self, engine: Engine) -> None:
         """Score the held-out recordings with what was found."""
         results, laws = self._results(), self._laws()[0]
         space = self._scenario.parameters
         shared = [p.name for p in space.parameters]
-        jobs: list[Job] = []
+        found: list[list[float]] = []
         scored: list[tuple[Case, Recording]] = []
         for case, recording in self._held_out:
             temperature = recording.temperature_degC
@@ -162,19 +193,21 @@ class _Search:
             except InputError as error:
                 self._notes.append(f"{recording.name} was not scored: {error}.")
                 continue
-            jobs.append(Job(f"validate/{case.name}", space.assignments(values), keep_signals=True))
+            found.append([values[name] for name in shared])
             scored.append((case, recording))
-        if not jobs:
+        if not scored:
             return
-        for (case, recording), outcome in zip(scored, runner.run(jobs), strict=True):
+        problem = self.held_out([case for case, _ in scored])
+        (outcomes,) = engine.ask(problem, Request(Want.SIGNALS, np.array([found]))).outcomes
+        for (case, recording), outcome in zip(scored, outcomes, strict=True):
             if outcome.signals is None:
                 self._notes.append(f"{recording.name} was not scored: {outcome.reason}")
                 continue
-            self._comparisons.append(compare(case, recording, "validate", outcome.signals))
+            self._comparisons.append(compare_case(case, recording, "validate", outcome.signals))
 
     def result(self) -> IdentifyResult:
         """Everything found so far."""
-        scenario, evaluator = self._scenario, self._evaluator
+        scenario, engine = self._scenario, self._engine
         laws, notes = self._laws()
         comparisons = [*self._fit_comparisons(), *self._comparisons]
         title = scenario.title or scenario.path.stem
@@ -199,8 +232,8 @@ class _Search:
             laws=laws,
             comparisons=tuple(comparisons),
             errors=summarise(comparisons),
-            evaluations=0 if evaluator is None else sum(evaluator.evaluations),
-            failures={} if evaluator is None else evaluator.failures,
+            evaluations=sum(self._evaluations(k) for k in range(len(self._points))),
+            failures={} if engine is None else engine.failures,
             parameter_set=identified,
             notes=(*scenario.notes, *failed, *notes, *left_out, *self._notes, *unsaid),
             settings={**scenario.search.model_dump(), "error": scenario.cost.error},
@@ -224,7 +257,11 @@ class _Search:
     def _slips(self) -> list[Finding]:
         """What one slip of one signal would explain of what the fit leaves, beyond what is known of the data."""
         known = {(f.recording, f.channel, f.kind) for f in self._scenario.data.findings}
-        found = [f for k in sorted(self._found) for f in misfits(self._point_residuals(k))]
+        found = [
+            f
+            for k in sorted(self._found)
+            for f in misfits(self._point_residuals(k), self._scenario.file_units)
+        ]
         return [f for f in found if (f.recording, f.channel, f.kind) not in known]
 
     def _bounds(self) -> list[str]:
@@ -259,9 +296,11 @@ class _Search:
         results = []
         for k, found in sorted(self._found.items()):
             if found.result is not None:
-                evaluations = 0 if self._evaluator is None else self._evaluator.evaluations[k]
-                results.append(replace(found.result, evaluations=evaluations))
+                results.append(replace(found.result, evaluations=self._evaluations(k)))
         return results
+
+    def _evaluations(self, k: int) -> int:
+        return 0 if self._engine is None else self._engine.evaluations[self._points[k].label]
 
     def _laws(self) -> tuple[dict[str, LawResult], list[str]]:
         return fit_laws(self._results(), self._scenario.laws)
@@ -271,7 +310,7 @@ class _Search:
         for k, found in sorted(self._found.items()):
             problem, recordings = self._points[k], self._scenario.points[k].fit
             for case, recording, signals in zip(problem.cases, recordings, found.signals, strict=False):
-                comparisons.append(compare(case, recording, "fit", signals))
+                comparisons.append(compare_case(case, recording, "fit", signals))
         return comparisons
 
 
@@ -286,14 +325,3 @@ def _held_out_cases(scenario: Scenario) -> list[tuple[Case, Recording]]:
         fixed = scenario.fixed if owner is None else owner.fixed
         cases.append((build_case(scenario, recording, fixed), recording))
     return cases
-
-
-def _experiments(
-    points: Sequence[PointProblem], held_out: Sequence[tuple[Case, Recording]]
-) -> list[Experiment]:
-    """Per fit recording one for the cost and one for the residuals; per held-out recording its signals."""
-    experiments = []
-    for point in points:
-        for case in point.cases:
-            experiments += [terms_experiment(case, point.error), residual_experiment(case)]
-    return experiments + [case.experiment(f"validate/{case.name}", None) for case, _ in held_out]

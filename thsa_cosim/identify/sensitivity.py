@@ -5,18 +5,17 @@ standard errors are those of a least-squares estimate at that place if white noi
 remains (Ljung, *System Identification*, 1999, section 9.4): (JᵀJ)⁻¹ with J per standard deviation of the noise.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from thsa_cosim.batch import Job, Runner
-from thsa_cosim.identify.evaluate import residual_experiment
 from thsa_cosim.identify.problem import PointProblem, build_point
 from thsa_cosim.scenario import Executor, Scenario
 from thsa_cosim.search import Box, DifferenceSettings, answer, difference_columns, estimate_uncertainty
 from thsa_cosim.search.differences import Residual
 from thsa_cosim.signals import FloatArray
+from thsa_cosim.study import Engine, Request, Want
 
 CONFOUNDED = 0.95
 """Correlation of two estimates from which on they are reported as confounded."""
@@ -68,24 +67,23 @@ def sensitivity(scenario: Scenario, executor: Executor) -> tuple[PointSensitivit
     Six simulations per parameter and recording, or a few more; nothing is written.
     """
     points = [build_point(scenario, point) for point in scenario.points]
-    experiments = [residual_experiment(case) for point in points for case in point.cases]
+    experiments = [experiment for point in points for experiment in point.experiments]
     with executor.open_runner(scenario.simulation, experiments) as runner:
-        return tuple(_at(point, runner) for point in points)
+        return tuple(_at(point, Engine(runner)) for point in points)
 
 
-def _at(point: PointProblem, runner: Runner) -> PointSensitivity:
-    space, runs, reasons = point.space, 0, [""]
+def _at(point: PointProblem, engine: Engine) -> PointSensitivity:
+    space, reasons = point.space, [""]
 
     def evaluate(vectors: FloatArray) -> Sequence[Residual]:
-        nonlocal runs
-        found = _simulate(point, runner, vectors, lambda reason: reasons.append(reason))
-        runs += len(vectors) * len(point.cases)
-        return found
+        reply = engine.ask(point, Request(Want.RESIDUALS, vectors))
+        reasons.extend(reason for reason in reply.reasons if reason)
+        return reply.residuals
 
     start, names = space.start(), tuple(case.name for case in point.cases)
     centre = evaluate(start[None, :])[0]
     if centre is None:
-        return PointSensitivity(point.label, names, (), (), runs, reasons[-1])
+        return PointSensitivity(point.label, names, (), (), engine.runs, reasons[-1])
     settings = DifferenceSettings(central=True, share=0.0, repeats=2)
     box, steps = Box.unit(space.dimension), np.full(space.dimension, 1e-3)
     jacobian, steps = answer(difference_columns(start, centre, steps, box, settings), evaluate)
@@ -111,30 +109,7 @@ def _at(point: PointProblem, runner: Runner) -> PointSensitivity:
             )
         )
     pairs = _confounded(space.names, expected.correlation)
-    return PointSensitivity(point.label, names, tuple(parameters), pairs, runs)
-
-
-def _simulate(
-    point: PointProblem, runner: Runner, vectors: FloatArray, on_failure: Callable[[str], None]
-) -> list[Residual]:
-    """Stacked residuals (N,) of each vector (m, n); None for one that failed."""
-    names = [residual_experiment(case).name for case in point.cases]
-    jobs = []
-    for values in point.space.physical(vectors):
-        named = dict(zip(point.space.names, values.tolist(), strict=True))
-        jobs += [
-            Job(name, point.space.assignments(named, case.name))
-            for name, case in zip(names, point.cases, strict=True)
-        ]
-    outcomes = runner.run(jobs)
-    found: list[Residual] = []
-    for k in range(0, len(outcomes), len(names)):
-        part = outcomes[k : k + len(names)]
-        failed = next((o for o in part if not o.ok or o.reduced is None), None)
-        if failed is not None:
-            on_failure(failed.reason)
-        found.append(None if failed else np.concatenate([o.reduced for o in part if o.reduced is not None]))
-    return found
+    return PointSensitivity(point.label, names, tuple(parameters), pairs, engine.runs)
 
 
 def _responses(point: PointProblem, change: FloatArray) -> dict[str, float]:

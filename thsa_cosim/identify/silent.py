@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from thsa_cosim.fmu.inputs import is_ours
-from thsa_cosim.identify.evaluate import Reply, Request, Want
 from thsa_cosim.identify.problem import PointProblem
 from thsa_cosim.signals import Signals
+from thsa_cosim.study import Reply, Request, Want
 from thsa_cosim.system import read_description
 
 _CHANGE = 0.3

@@ -6,17 +6,18 @@ parameter is therefore no slip, nor what such a value hides. The slip that expla
 tested again. A model that lacks something leaves structure that no slip explains: it has no finding.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
+from thsa_cosim.errors import UnitError
 from thsa_cosim.inspection.across import SLIPS, slip
 from thsa_cosim.inspection.finding import Finding, Severity
 from thsa_cosim.inspection.trust import Residual
 from thsa_cosim.recordings import noise_estimate
 from thsa_cosim.signals import FloatArray
+from thsa_cosim.units import conversion
 
 _SURE = 60.0
 """Drop of the sum of squares, in noise variances, below which nothing is said (z of 7.7)."""
@@ -42,16 +43,20 @@ _MOST = 3
 _LEAST = 200
 
 
+_Column = Sequence[tuple[slice, FloatArray]]
+"""What a slip leaves: values by the rows of one channel; 0 in all others."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Slip:
-    """One explanation: ``column`` (N,) is what it leaves, ``size`` in its own unit (s, the signal's unit, a factor).
+    """One explanation: ``column`` is what it leaves, ``size`` in its own unit (s, the signal's unit, a factor).
 
     ``gain``: how far it lowers the sum of squares; ``weight``: what of that counts beside others.
     """
 
     kind: str
     channel: str
-    column: FloatArray
+    column: _Column
     size: float
     gain: float
     at: float = 0.0
@@ -81,34 +86,61 @@ class _Rest:
         """``column`` (N,) less its projection on what is explained already."""
         return np.asarray(column - self._basis @ (self._basis.T @ column))
 
-    def gain(self, column: FloatArray) -> tuple[float, float]:
+    def gain(self, column: _Column) -> tuple[float, float]:
         """Best coefficient of ``column`` and how far it lowers the sum of squares."""
-        free = self.without(column)
-        power = float(free @ free)
-        if power <= 1e-8 * float(column @ column) or power <= 0.0:
+        product, power, free = self._products(column)
+        if free <= 1e-8 * power or free <= 0.0:
             return 0.0, 0.0  # the parameters do the same
-        product = float(free @ self.values)
-        return product / power, product * product / power
+        return product / free, product * product / free
 
-    def drop(self, column: FloatArray) -> float:
+    def drop(self, column: _Column) -> float:
         """How far ``column`` as it is lowers the sum of squares."""
-        left = self.values - self.without(column)
-        return float(self.values @ self.values - left @ left)
+        product, _, free = self._products(column)
+        return 2.0 * product - free
 
-    def beside_late(self, column: FloatArray, which: Sequence[int], by: float) -> float:
+    def _products(self, column: _Column) -> tuple[float, float, float]:
+        """Of ``column``: product with the residuals, sum of squares, and that of what the parameters cannot make.
+
+        The residuals are orthogonal to the orthonormal basis: only the rows of the column count.
+        """
+        product, power, made = 0.0, 0.0, np.zeros(self._basis.shape[1])
+        for rows, values in column:
+            product += float(values @ self.values[rows])
+            power += float(values @ values)
+            made += values @ self._basis[rows]
+        return product, power, power - float(made @ made)
+
+    def best(self, rows: slice, shapes: FloatArray) -> FloatArray:
+        """Coefficients (m,) with which ``shapes`` (n, m), 0 outside ``rows``, lower the sum of squares most."""
+        made = shapes.T @ self._basis[rows]
+        gram = shapes.T @ shapes - made @ made.T
+        size = np.sqrt(np.einsum("ij,ij->j", shapes, shapes))
+        scaled = np.linalg.lstsq(
+            gram / np.outer(size, size), shapes.T @ self.values[rows] / size, rcond=1e-10
+        )
+        return np.asarray(scaled[0] / size)
+
+    def whole(self, column: _Column) -> FloatArray:
+        """``column`` (N,) over all recordings and channels."""
+        found = np.zeros(self.values.size)
+        for rows, values in column:
+            found[rows] = values
+        return found
+
+    def beside_late(self, column: _Column, which: Sequence[int], by: float) -> float:
         """Sum of squares after ``column`` where what parameters do to the channels ``which`` is late ``by`` s, too."""
         slopes = self._slopes.copy()
         for k in which:
             rows, time = self.rows[k], self.own[k].time
             for i in range(slopes.shape[1]):
                 slopes[rows, i] = np.interp(time - by, time, slopes[rows, i])
-        basis, left = _orthonormal(slopes), self._stacked - column
+        basis, left = _orthonormal(slopes), self._stacked - self.whole(column)
         left = left - basis @ (basis.T @ left)
         return float(left @ left)
 
-    def take(self, column: FloatArray) -> None:
+    def take(self, column: _Column) -> None:
         """Take ``column`` into what is explained."""
-        free = self.without(column)
+        free = self.without(self.whole(column))
         free /= np.linalg.norm(free)
         self.values = self.values - free * float(free @ self.values)
         self._basis = np.column_stack((self._basis, free))
@@ -121,10 +153,13 @@ class _Rest:
         return max(sum(parts) - sum(counts), 0.0)
 
 
-def misfits(residuals: Sequence[Residual]) -> list[Finding]:
+def misfits(
+    residuals: Sequence[Residual], file_units: Mapping[str, str | None] | None = None
+) -> list[Finding]:
     """Return findings on what the fit of one set of parameters leaves; residuals without ``simulated`` tell nothing.
 
-    The columns of the residuals' ``slopes`` are the same parameters throughout.
+    The columns of the residuals' ``slopes`` are the same parameters throughout. ``file_units``: of the channels'
+    columns in the file, in which remedies are given; None: by the file itself.
     """
     if not residuals or any(r.simulated.size != r.values.size or not _usable(r) for r in residuals):
         return []
@@ -135,7 +170,7 @@ def misfits(residuals: Sequence[Residual]) -> list[Finding]:
     first = 0
     for name in dict.fromkeys(r.recording for r in residuals):
         own = [r for r in residuals if r.recording == name]
-        found += _recording(_Rest(own, stacked, slopes, basis, first))
+        found += _recording(_Rest(own, stacked, slopes, basis, first), file_units or {})
         first += sum(r.values.size for r in own)
     return found
 
@@ -156,10 +191,10 @@ def _orthonormal(slopes: FloatArray) -> FloatArray:
 
 def _floor(values: FloatArray) -> float:
     """Variance of the white part of a residual; no more than all of it."""
-    return min(noise_estimate(values) ** 2, float(np.mean(values**2)))
+    return min(noise_estimate(values, smooth=False) ** 2, float(np.mean(values**2)))
 
 
-def _recording(rest: _Rest) -> Iterator[Finding]:
+def _recording(rest: _Rest, file_units: Mapping[str, str | None]) -> Iterator[Finding]:
     against = [f for r in rest.own if (f := _against(r)) is not None]
     if against:
         yield from against  # of a fit to the wrong sign nothing else is told
@@ -176,7 +211,8 @@ def _recording(rest: _Rest) -> Iterator[Finding]:
         if best.gain < _SURE * floor or best.gain < least * excess:
             return
         share = best.gain / excess
-        finding = _finding(rest, _settled_delay(rest, best) if best.kind.endswith("delay") else best, share)
+        settled = _settled_delay(rest, best) if best.kind.endswith("delay") else best
+        finding = _finding(rest, settled, share, file_units)
         if finding is None:
             return
         yield finding
@@ -197,10 +233,8 @@ def _against(residual: Residual) -> Finding | None:
     return Finding(residual.recording, name, "sign", "error", text, (), remedy)
 
 
-def _column(rest: _Rest, k: int, own: FloatArray) -> FloatArray:
-    column = np.zeros(rest.values.size)
-    column[rest.rows[k]] = own
-    return column
+def _column(rest: _Rest, k: int, own: FloatArray) -> _Column:
+    return [(rest.rows[k], own)]
 
 
 def _candidates(rest: _Rest, k: int) -> Iterator[_Slip]:
@@ -227,11 +261,11 @@ def _candidates(rest: _Rest, k: int) -> Iterator[_Slip]:
 def _drift(rest: _Rest, k: int, elapsed: FloatArray) -> _Slip:
     """A drift from wherever it begins: a straight line over ``elapsed`` s."""
     residual = rest.own[k]
-    shapes = [_column(rest, k, -shape / residual.noise) for shape in (np.ones(elapsed.size), elapsed)]
-    free = np.column_stack([rest.without(shape) for shape in shapes])
-    level, slope = np.linalg.lstsq(free, rest.values, rcond=1e-6)[0]
-    column = level * shapes[0] + slope * shapes[1]
-    return _Slip("drift", residual.channel, column, float(slope), rest.drop(column), weight=_CHOSEN)
+    span = float(np.ptp(elapsed))
+    shapes = np.column_stack((np.ones(elapsed.size), elapsed / span)) / -residual.noise
+    level, slope = rest.best(rest.rows[k], shapes)
+    column = _column(rest, k, shapes @ (level, slope))
+    return _Slip("drift", residual.channel, column, slope / span, rest.drop(column), weight=_CHOSEN)
 
 
 def _delayed(rest: _Rest, which: Sequence[int], channel: str) -> Iterator[_Slip]:
@@ -249,13 +283,13 @@ def _delayed(rest: _Rest, which: Sequence[int], channel: str) -> Iterator[_Slip]
     yield _Slip("delay", channel, column, best, rest.drop(column))
 
 
-def _late(rest: _Rest, which: Sequence[int], by: float) -> FloatArray:
-    """What is left (N,) of channels that are late ``by`` s."""
-    column = np.zeros(rest.values.size)
+def _late(rest: _Rest, which: Sequence[int], by: float) -> _Column:
+    """What is left of channels that are late ``by`` s."""
+    column = []
     for k in which:
         r = rest.own[k]
         shifted = np.interp(r.time - by, r.time, r.simulated)
-        column[rest.rows[k]] = (r.simulated - shifted) / r.noise
+        column.append((rest.rows[k], (r.simulated - shifted) / r.noise))
     return column
 
 
@@ -265,6 +299,8 @@ def _settled_delay(rest: _Rest, best: _Slip) -> _Slip:
         return best
     every = range(len(rest.own))
     which = [k for k in every if best.kind == "common-delay" or rest.own[k].channel == best.channel]
+
+    from scipy.optimize import minimize_scalar  # slow to import, and slips are rare
 
     def left(by: float) -> float:
         return rest.beside_late(_late(rest, which, by), which, by)
@@ -282,7 +318,7 @@ def _common_delay(rest: _Rest) -> Iterator[_Slip]:
             yield _Slip("common-delay", found.channel, found.column, found.size, found.gain)
 
 
-def _finding(rest: _Rest, best: _Slip, share: float) -> Finding | None:
+def _finding(rest: _Rest, best: _Slip, share: float, file_units: Mapping[str, str | None]) -> Finding | None:
     """``best`` in words; None if it is too small, or no slip after all."""
     if best.kind == "common-delay":
         return _delay_finding(rest.own[0], best, -best.size, share)
@@ -311,8 +347,19 @@ def _finding(rest: _Rest, best: _Slip, share: float) -> Finding | None:
         where = ((best.at, float(residual.time[-1])),)
         return Finding(residual.recording, name, "step", "warning", text, where)
     text = f"{what} all the time, {explained}: an offset of its sensor, or a constant that the model lacks"
-    remedy = f"{table}\noffset = {-best.size:.4g}  # in {unit}, the unit of the FMU's variable"
+    remedy = f"{table}\noffset = {_in_file(-best.size, unit, file_units.get(name))}"
     return Finding(residual.recording, name, "offset", "warning", text, (), remedy)
+
+
+def _in_file(offset: float, unit: str, file_unit: str | None) -> str:
+    """An offset as a scenario wants it: in the file's unit."""
+    try:
+        own = offset * conversion(unit, file_unit)[0] if file_unit else None
+    except UnitError:
+        own = None
+    if own is None:
+        return f"{offset:.4g}  # in {unit}; write it in the unit of the file's numbers"
+    return f"{own:.4g}  # in {file_unit}, the unit of the file's numbers"
 
 
 def _delay_finding(residual: Residual, best: _Slip, by: float, share: float) -> Finding | None:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from thsa_cosim.recordings.arrow import to_numpy
 from thsa_cosim.recordings.table import Choose, RawColumn, numeric, split_unit
 
 
@@ -24,6 +25,6 @@ def _column(values: pa.ChunkedArray, field: pa.Field) -> RawColumn:
     numeric_kind = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)
     if not (numeric_kind or pa.types.is_decimal(kind) or pa.types.is_temporal(kind)):
         return RawColumn(problem=f"is not numeric but {kind}")
-    column = numeric(values.to_numpy())
+    column = numeric(to_numpy(values))
     unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace") or split_unit(field.name)[1]
     return RawColumn(column.values, column.unit or unit, problem=column.problem)

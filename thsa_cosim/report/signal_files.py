@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from thsa_cosim.errors import InputError
+from thsa_cosim.recordings.arrow import from_numpy, to_numpy
 from thsa_cosim.signals import FloatArray, Signals
 
 FOLDER = "signals"
@@ -52,7 +53,7 @@ def write_signals(folder: Path, role: str, name: str, variants: Mapping[str, Sig
         for channel in signals.names:
             columns[f"{channel}.{variant}"] = np.where(beyond, np.nan, on_samples[channel])
             units[channel] = signals.units[channel]
-    table = pa.table({key: pa.array(values) for key, values in columns.items()})
+    table = pa.table({key: from_numpy(values) for key, values in columns.items()})
     facts = {"units": json.dumps(units), "variants": json.dumps(list(variants)), "name": name, "role": role}
     path = folder / FOLDER / file_name(role) / f"{file_name(name)}.parquet"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -65,9 +66,10 @@ def write_signals(folder: Path, role: str, name: str, variants: Mapping[str, Sig
 def read_signals(path: Path) -> SignalFile:
     """Read what ``write_signals`` wrote; InputError for any other file."""
     try:
-        table = pq.read_table(path)
+        with pq.ParquetFile(path) as file:
+            table = file.read()
         facts = _facts(path, table.schema)
-        columns = {n: np.asarray(table[n].to_numpy(), dtype=np.float64) for n in table.column_names}
+        columns = {n: np.asarray(to_numpy(table[n]), dtype=np.float64) for n in table.column_names}
         time = columns.pop(TIME)
     except (OSError, KeyError, ValueError, pa.ArrowException) as error:
         reason = " ".join(str(error).split())[:120]

@@ -25,7 +25,15 @@ from thsa_cosim.scenario.tune_model import (
     ScheduleSpec,
     TuneScenario,
 )
-from thsa_cosim.scenario.tune_schema import LOOP_METRICS, METRICS, ConditionTable, RequirementTable, TuneTable
+from thsa_cosim.scenario.tune_schema import (
+    LOOP_METRICS,
+    METRICS,
+    START_METRICS,
+    ConditionTable,
+    RequirementTable,
+    StartTable,
+    TuneTable,
+)
 from thsa_cosim.scenario.tune_uncertainty import read_uncertainty
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import convert
@@ -68,7 +76,7 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
     axes = tuple(_axis(name, axis, fmu, f"conditions.{name}") for name, axis in table.conditions.items())
     driven = {command.input, *(axis.name for axis in axes)}
     for variable in fmu.inputs:
-        if variable.is_float and variable.name not in driven:
+        if variable.is_float and variable.name not in driven and not variable.may_stay_open:
             raise ScenarioError(
                 f"conditions.{variable.name} is missing: input {variable.name!r} of {fmu.path.name} needs values."
             )
@@ -109,6 +117,7 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         cost=_cost(table, command, fmu),
         requirements=requirements,
         loop=_loop(table, command, fmu, space),
+        start=_start(table, fmu),
         combine=table.robust.combine,
         uncertainty=read_uncertainty(path, table, axes, fmu),
         schedule=_schedule(table, axes, fmu),
@@ -219,6 +228,12 @@ def _requirement(
         raise ScenarioError(
             f"{key}: {spec.metric} needs the table [loop] with the signal to open the loop at."
         )
+    if spec.metric in START_METRICS:
+        if table.start is None or spec.metric not in table.start.terms:
+            raise ScenarioError(
+                f"{key}: {spec.metric} needs the table [start] with current, voltage and their limits."
+            )
+        unit = unit or fmu.variables[table.start.current].unit or "1"
     if spec.metric == "effort":
         if table.metrics.effort is None:
             raise ScenarioError(f"{key}: effort needs metrics.effort, the signal that counts.")
@@ -280,7 +295,16 @@ def _loop(
     if table.loop.margins == "python-control" and importlib.util.find_spec("control") is None:
         raise MissingExtraError("loop.margins = 'python-control'", "control")
     variables = tuple(space[name].variable for name in names)
-    return LoopSpec(table.loop.signal, at, variables, table.loop.margins)
+    return LoopSpec.resolved(table.loop, at=at, gains=variables)
+
+
+def _start(table: TuneTable, fmu: FmuDescription) -> StartTable | None:
+    if table.start is not None:
+        for key in ("current", "voltage"):
+            name = getattr(table.start, key)
+            if name is not None:
+                check.readable(fmu, name, f"start.{key}")
+    return table.start
 
 
 def _schedule(table: TuneTable, axes: Sequence[Axis], fmu: FmuDescription) -> ScheduleSpec | None:
@@ -298,6 +322,4 @@ def _schedule(table: TuneTable, axes: Sequence[Axis], fmu: FmuDescription) -> Sc
     if len(set(spec.over)) < len(spec.over):
         raise ScenarioError("schedule.over names a condition twice; remove one.")
     swept = {name: _axis(name, t, fmu, f"schedule.check.{name}") for name, t in spec.check.items()}
-    return ScheduleSpec(
-        tuple(spec.over), spec.smoothing, spec.reserve, tuple(swept.get(a.name, a) for a in axes)
-    )
+    return ScheduleSpec.resolved(spec, check=tuple(swept.get(a.name, a) for a in axes))

@@ -9,7 +9,16 @@ from typing import Literal
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.scenario.schema import SearchTable, SimulationTable
-from thsa_cosim.scenario.tune_schema import LineTable, MetricsTable, ParetoTable, SurfaceTable, TuneTable
+from thsa_cosim.scenario.tune_schema import (
+    LineTable,
+    LoopTable,
+    MetricsTable,
+    ParetoTable,
+    ScheduleTable,
+    StartTable,
+    SurfaceTable,
+    TuneTable,
+)
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import convert
 
@@ -112,18 +121,14 @@ class Requirement:
         return replace(self, limit=self.limit - (reserve if self.upper else -reserve) * abs(self.limit))
 
 
-@dataclass(frozen=True)
-class LoopSpec:
-    """The loop is opened at ``signal``; linearised with the response's state at ``at`` [s].
+class LoopSpec(LoopTable):
+    """``[loop]`` with its defaults: linearised with the response's state ``at`` [s].
 
-    ``gains`` are FMU parameters that act on the plant through that signal alone; ``margins`` says who reads
-    gain and phase margin off the loop's frequency response.
+    ``gains`` are FMU parameters that act on the plant through the signal alone.
     """
 
-    signal: str
     at: float
-    gains: tuple[str, ...]
-    margins: Literal["own", "python-control"] = "own"
+    gains: tuple[str, ...]  # type: ignore[assignment]
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,17 +155,10 @@ class UncertaintySpec:
     points: tuple[CovariancePoint, ...]
 
 
-@dataclass(frozen=True)
-class ScheduleSpec:
-    """Gains over the conditions ``over``; ``check`` holds the axes of the sweep.
+class ScheduleSpec(ScheduleTable):
+    """``[schedule]``, whose ``check`` holds the axes of the sweep."""
 
-    The nodes' own searches keep ``reserve`` (a share) away from the limits, which leaves room to smooth.
-    """
-
-    over: tuple[str, ...]
-    smoothing: float
-    reserve: float
-    check: tuple[Axis, ...]
+    check: tuple[Axis, ...]  # type: ignore[assignment]
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,6 +185,7 @@ class TuneScenario:
     cost: ControlCostSpec
     requirements: tuple[Requirement, ...]
     loop: LoopSpec | None
+    start: StartTable | None
     combine: Literal["worst", "sum"]
     uncertainty: UncertaintySpec | None
     schedule: ScheduleSpec | None

@@ -22,8 +22,14 @@ METRICS = {
     "gain_margin": ("dB", 10.0),
     "phase_margin": ("deg", 10.0),
     "bandwidth": ("Hz", 10.0),
+    "start_time": ("s", 0.1),
+    "breakaway_current": ("", 1.0),
+    "breakaway_margin": ("1", 0.1),
+    "current_reserve": ("1", 0.1),
+    "voltage_reserve": ("1", 0.1),
 }
 LOOP_METRICS = ("gain_margin", "phase_margin", "bandwidth")
+START_METRICS = ("start_time", "breakaway_current", "breakaway_margin", "current_reserve", "voltage_reserve")
 TERMS = ("tracking", *METRICS)
 
 
@@ -232,6 +238,43 @@ class LoopTable(Table):
     """``"python-control"`` has python-control read gain and phase margin (extra ``control``)."""
 
 
+class StartTable(Table):
+    """``[start]``: the start from rest after a soak, against what the drive can give.
+
+    It adds terms to every response: ``start_time`` (s from the start of the command until the output moves),
+    ``breakaway_current`` (the current at that moment), ``breakaway_margin`` (``current_limit`` over that current,
+    less one), ``current_reserve`` and ``voltage_reserve`` (1 − peak / limit). Breakaway current includes what
+    accelerates the motor; a slow ramp gives the static one.
+    """
+
+    moving: Annotated[float, Field(gt=0, lt=1)] = 0.02
+    """Share of its last value from which the output counts as moving."""
+    current: Name
+    """The motor's current."""
+    current_limit: Positive
+    """What the drive can give, in the signal's unit."""
+    voltage: Name | None = None
+    """The motor's voltage."""
+    voltage_limit: Positive | None = None
+    """What the drive can give, in the signal's unit."""
+
+    @model_validator(mode="after")
+    def _voltage(self) -> "StartTable":
+        if (self.voltage is None) != (self.voltage_limit is None):
+            raise PydanticCustomError("voltage", "voltage and voltage_limit go together; give both or none")
+        return self
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """What it reads besides the command's output."""
+        return tuple(name for name in (self.current, self.voltage) if name is not None)
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of its terms, in the order in which a response gives them."""
+        return START_METRICS if self.voltage is not None else START_METRICS[:-1]
+
+
 class RobustTable(Table):
     """``[robust]``: how the conditions of one set of gains become one number."""
 
@@ -321,6 +364,7 @@ class TuneTable(ModelTable):
     cost: ControlCostTable
     requirements: list[RequirementTable] = Field(default_factory=list)
     loop: LoopTable | None = None
+    start: StartTable | None = None
     robust: RobustTable = RobustTable()
     uncertainty: UncertaintyTable | None = None
     schedule: ScheduleTable | None = None

@@ -1,35 +1,66 @@
 """A study: what was asked, where it is kept, where it runs, and what is known so far.
 
-``study``     the one who works in a study folder: every simulation goes through it
-``place``     folder, executor, progress and command as one object
-``identity``  what was asked, key by key, built from all that a scenario says
-``folder``    the study folder: its marker, and the refusal to mix two studies
-``runs``      the log of runs: what was simulated once is not simulated again
-``digest``    files, folders and recordings as digests
-``exported``  FMUs that are kept in the folder, and what they were made from
+``study``       the one who works in a study folder: every simulation goes through it
+``case``        a recording as a simulation that a model has to match
+``engine``      vectors × cases → journal → outcomes: every kind asks it
+``interleave``  several searches at once over one engine
+``comparison``  simulated against measured
+``place``       folder, executor, progress and command as one object
+``identity``    what was asked, key by key, built from all that a scenario says
+``folder``      the study folder: its marker, and the refusal to mix two studies
+``runs``        the log of runs: what was simulated once is not simulated again
+``digest``      files, folders and recordings as digests
+``exported``    FMUs that are kept in the folder, and what they were made from
 """
 
+from thsa_cosim.study.case import Case, build_case, communication_points
+from thsa_cosim.study.comparison import (
+    ChannelError,
+    Comparison,
+    case_residuals,
+    compare,
+    compare_case,
+    summarise,
+)
 from thsa_cosim.study.digest import digest_of_folder, digest_of_recording, digest_of_text
+from thsa_cosim.study.engine import Engine, Problem, Reply, Request, Want, stacked
 from thsa_cosim.study.exported import export_digest, is_made_from, note_made_from
 from thsa_cosim.study.folder import MARKER, claim_folder, describe
 from thsa_cosim.study.identity import stages_identity, study_identity
+from thsa_cosim.study.interleave import interleave
 from thsa_cosim.study.place import OnProgress, Place, Progress
 from thsa_cosim.study.study import Study
 
 __all__ = [
     "MARKER",
+    "Case",
+    "ChannelError",
+    "Comparison",
+    "Engine",
     "OnProgress",
     "Place",
+    "Problem",
     "Progress",
+    "Reply",
+    "Request",
     "Study",
+    "Want",
+    "build_case",
+    "case_residuals",
     "claim_folder",
+    "communication_points",
+    "compare",
+    "compare_case",
     "describe",
     "digest_of_folder",
     "digest_of_recording",
     "digest_of_text",
     "export_digest",
+    "interleave",
     "is_made_from",
     "note_made_from",
+    "stacked",
     "stages_identity",
     "study_identity",
+    "summarise",
 ]

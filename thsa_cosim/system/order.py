@@ -9,8 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from thsa_cosim.system.structure import Component, System
 
@@ -39,6 +37,9 @@ def stages(system: System) -> tuple[Stage, ...]:
             depends[a, writer[target]] = True
     if not n:
         return ()
+    from scipy.sparse import csr_array  # slow to import, and every worker imports this room
+    from scipy.sparse.csgraph import connected_components
+
     count, labels = connected_components(csr_array(depends), directed=True, connection="strong")
     members = [[sources[k] for k in np.flatnonzero(labels == group)] for group in range(count)]
     loops = [len(found) > 1 or bool(depends[index[found[0]], index[found[0]]]) for found in members]

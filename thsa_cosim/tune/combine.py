@@ -18,7 +18,7 @@ INFEASIBLE = 1e9
 #: Excess of a metric that does not exist (a level never reached, a band never kept).
 UNDEFINED = 100.0
 #: Terms of which less is worse.
-SMALLEST = ("gain_margin", "phase_margin")
+SMALLEST = ("gain_margin", "phase_margin", "breakaway_margin", "current_reserve", "voltage_reserve")
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +12,13 @@ from thsa_cosim.costs import control_cost, settling_time
 from thsa_cosim.fmu import FmuDescription, SimulationFailure
 from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.linear import open_loop, state_names
-from thsa_cosim.scenario import TuneScenario
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.tune.margins import Margins, margins
+from thsa_cosim.tune.start import start_terms
+
+if TYPE_CHECKING:  # workers import this module
+    from thsa_cosim.scenario import TuneScenario
+    from thsa_cosim.scenario.tune_schema import StartTable
 
 
 @dataclass(frozen=True)
@@ -26,7 +31,7 @@ class Terms:
     with_loop: bool
 
     @classmethod
-    def of(cls, scenario: TuneScenario) -> "Terms":
+    def of(cls, scenario: "TuneScenario") -> "Terms":
         """The terms that a scenario asks for."""
         peaks = tuple(dict.fromkeys(r.signal for r in scenario.requirements if r.signal))
         names = [
@@ -39,6 +44,7 @@ class Terms:
         ]
         names += ["effort"] if scenario.metrics.effort else []
         names += [f"peak.{signal}" for signal in peaks]
+        names += scenario.start.terms if scenario.start else ()
         names += ["gain_margin", "phase_margin", "bandwidth"] if scenario.loop else []
         return cls(tuple(names), peaks, scenario.metrics.effort, scenario.loop is not None)
 
@@ -110,12 +116,14 @@ class ResponseReducer:
     low: float | None
     window: tuple[float, float]
     settling_band: float
+    start: "StartTable | None"
     loop: LoopTask | None
 
     @property
     def recorded(self) -> tuple[str, ...]:
         """Variables that the simulation must record."""
         own = (self.output, *((self.terms.effort,) if self.terms.effort else ()), *self.terms.peaks)
+        own = (*own, *(self.start.signals if self.start else ()))
         return tuple(dict.fromkeys((*own, *(self.loop.recorded if self.loop else ()))))
 
     def __call__(self, signals: Signals) -> FloatArray:
@@ -145,6 +153,8 @@ class ResponseReducer:
         if self.terms.effort is not None:
             found.append(float(np.sqrt(np.mean(signals[self.terms.effort] ** 2))))
         found += [float(np.max(np.abs(signals[name]))) for name in self.terms.peaks]
+        if self.start is not None:
+            found += start_terms(self.start, signals, self.output, self.begin)
         if self.loop is not None:
             m = self.loop(signals, self.command)
             found += [m.gain_margin, m.phase_margin, m.bandwidth]
@@ -152,7 +162,7 @@ class ResponseReducer:
 
 
 def reducer(
-    scenario: TuneScenario, inputs: Mapping[str, float], fixed: Mapping[str, float]
+    scenario: "TuneScenario", inputs: Mapping[str, float], fixed: Mapping[str, float]
 ) -> ResponseReducer:
     """The reducer of one condition: its constant ``inputs`` and ``fixed`` start values, in the FMU's units."""
     command, metrics = scenario.command, scenario.metrics
@@ -168,6 +178,7 @@ def reducer(
         low=metrics.low if metrics.rise == "between" else None,
         window=(metrics.window[0], metrics.window[1]),
         settling_band=metrics.settling_band,
+        start=scenario.start,
         loop=None
         if loop is None
         else LoopTask(

@@ -9,18 +9,26 @@ import numpy as np
 from thsa_cosim import __version__
 from thsa_cosim.batch import Journal
 from thsa_cosim.errors import StudyError
-from thsa_cosim.identify.interleave import interleave
 from thsa_cosim.scenario import TuneScenario
 from thsa_cosim.scenario.tune_model import combinations
 from thsa_cosim.search import EvolutionResult, EvolutionSettings, Generation, evolve
 from thsa_cosim.signals import FloatArray
-from thsa_cosim.study import Place, Study, describe, study_identity
+from thsa_cosim.study import (
+    Engine,
+    Place,
+    Reply,
+    Request,
+    Study,
+    Want,
+    describe,
+    interleave,
+    study_identity,
+)
 from thsa_cosim.tune.combine import INFEASIBLE, equation_7
-from thsa_cosim.tune.evaluate import Evaluation, Evaluator, Reply, Request, cases_of
+from thsa_cosim.tune.evaluate import Evaluation, evaluate, evaluate_each
 from thsa_cosim.tune.pareto import front
 from thsa_cosim.tune.population import Line, PopulationPath, line_of
-from thsa_cosim.tune.problem import ALL, Case, Group, build_cases, build_groups
-from thsa_cosim.tune.response import Terms
+from thsa_cosim.tune.problem import ALL, Group, SampledCondition, build_cases, build_groups
 from thsa_cosim.tune.results import (
     GroupResult,
     Pareto,
@@ -55,21 +63,22 @@ def tune(scenario: TuneScenario, place: Place) -> TuneResult:
         If no simulation gave a usable response.
     """
     groups = build_groups(scenario)
-    checked: Sequence[Case] = ()
+    checked: Sequence[SampledCondition] = ()
     if scenario.schedule is not None:
         checked = build_cases(scenario, combinations(scenario.schedule.check), sampled=False)
-    names = Terms.of(scenario).names
-    tuning = _Tuning(scenario, groups, Group("check", {}, tuple(checked), scenario.requirements), names)
+    check = Group(scenario, "check", {}, tuple(checked), scenario.requirements)
+    names = check.term_names
+    tuning = _Tuning(scenario, groups, check, names)
     with (
         Study.open(place, study_identity(scenario), describe(scenario)) as study,
         Journal.open(place.folder / JOURNAL, scenario.parameters.names, names) as journal,
     ):
         try:
-            experiments = [case.experiment for case in cases_of([*groups, tuning.check])]
-            with study.open_runner(scenario.simulation, experiments) as runner:
+            named = {case.experiment.name: case.experiment for g in (*groups, check) for case in g.cases}
+            with study.open_runner(scenario.simulation, list(named.values())) as runner:
                 tuning.notes += runner.notes
-                evaluator = Evaluator(scenario, runner, journal, groups, names, place.on_progress)
-                tuning.run(evaluator, journal)
+                engine = Engine(runner, journal, place.on_progress, "tuning")
+                tuning.run(engine, journal)
             study.complete()
         except KeyboardInterrupt:
             tuning.interrupted = True
@@ -92,25 +101,25 @@ class _Tuning:
     pareto: Pareto | None = None
     schedule: ScheduleResult | None = None
     notes: list[str] = field(default_factory=list)
-    evaluator: Evaluator | None = None
+    engine: Engine | None = None
 
-    def run(self, evaluator: Evaluator, journal: Journal) -> None:
+    def run(self, engine: Engine, journal: Journal) -> None:
         """Search all groups at once, then score, draw and schedule."""
-        self.evaluator = evaluator
-        self._search(evaluator)
+        self.engine = engine
+        self._search(engine)
         spec = self.scenario
         sets = {"before": spec.before, "after": self._gains(0), **spec.compare}
-        found = evaluator.evaluate(self.groups[0], [dict(v) for v in sets.values()], keep_signals=True)
+        found = evaluate(engine, self.groups[0], [dict(v) for v in sets.values()], keep_signals=True)
         self.scored = [self._score(name, f) for name, f in zip(sets, found, strict=True)]
         if spec.surface is not None:
-            self.surface = self._surface(evaluator)
+            self.surface = self._surface(engine)
         if spec.pareto is not None:
             self.pareto = self._pareto(journal)
         if spec.schedule is not None:
-            self.schedule = self._schedule(evaluator)
+            self.schedule = self._schedule(engine)
 
     # -- search ---------------------------------------------------------------------------------------
-    def _search(self, evaluator: Evaluator) -> None:
+    def _search(self, engine: Engine) -> None:
         spec = self.scenario.search
         settings = EvolutionSettings(
             population=spec.population,
@@ -122,27 +131,29 @@ class _Tuning:
             tolerance=spec.tolerance,
         )
         planned = settings.population * (settings.generations + 1)
-        for k in range(len(self.groups)):
-            evaluator.plan(k, planned)
+        for group in self.groups:
+            engine.plan(group, planned)
 
         def task(index: int) -> Callable[[Ask], EvolutionResult]:
-            return lambda ask: self._evolve(index, settings, evaluator, ask)
+            return lambda ask: self._evolve(index, settings, engine, ask)
 
         tasks = [task(k) for k in range(len(self.groups))]
-        with closing(interleave(tasks, evaluator.serve)) as finished:
+
+        def serve(requests: Sequence[tuple[int, Request]]) -> list[Reply]:
+            return engine.serve([(self.groups[k], request) for k, request in requests])
+
+        with closing(interleave(tasks, serve)) as finished:
             for index, result in finished:
                 self.found[index] = result
-                evaluator.plan(index, result.evaluations - planned)
+                engine.finish(self.groups[index])
 
-    def _evolve(
-        self, index: int, settings: EvolutionSettings, evaluator: Evaluator, ask: Ask
-    ) -> EvolutionResult:
+    def _evolve(self, index: int, settings: EvolutionSettings, engine: Engine, ask: Ask) -> EvolutionResult:
         space = self.scenario.parameters
         path = self.paths[index] = PopulationPath()
 
         def costs(vectors: FloatArray) -> FloatArray:
             values = space.physical(vectors)
-            reply = ask(Request(values))
+            reply = ask(Request(Want.TERMS, values))
             if not path.populations and not np.isfinite(reply.costs).any():
                 reason = next((r for r in reply.reasons if r), "no response reaches its command")
                 raise StudyError(
@@ -155,7 +166,7 @@ class _Tuning:
         start = space.start() if any(p.start is not None for p in space.parameters) else None
 
         def on_generation(generation: Generation) -> None:
-            evaluator.note_generation(generation.index)
+            engine.note_generation(generation.index)
 
         return evolve(costs, space.dimension, settings, start=start, on_generation=on_generation)
 
@@ -181,7 +192,7 @@ class _Tuning:
             signals=found.signals,
         )
 
-    def _surface(self, evaluator: Evaluator) -> Surface:
+    def _surface(self, engine: Engine) -> Surface:
         spec, space = self.scenario.surface, self.scenario.parameters
         assert spec is not None
         best = self.found[0].best
@@ -191,10 +202,10 @@ class _Tuning:
         vectors[:, i] = np.tile(unit, spec.points)
         vectors[:, j] = np.repeat(unit, spec.points)
         values = space.physical(vectors)
-        evaluator.plan(0, len(values))
-        reply = evaluator.serve([(0, Request(values))])[0]
+        engine.plan(self.groups[0], len(values))
+        reply = engine.ask(self.groups[0], Request(Want.TERMS, values))
         shape = (spec.points, spec.points)
-        eq7 = self._eq7_of_worst(reply.worst)
+        eq7 = self._eq7_of_worst(reply.terms)
         feasible = reply.costs < INFEASIBLE
         return Surface(
             names=(spec.parameters[0], spec.parameters[1]),
@@ -213,7 +224,9 @@ class _Tuning:
         spec = self.scenario.pareto
         assert spec is not None
         i, j = self.names.index(spec.x), self.names.index(spec.y)
-        rows = [row for row in journal.rows if row.stage == ALL and row.cost < INFEASIBLE]
+        # Rows come in as their simulations end; by their numbers they are in the order of the search.
+        asked = sorted((row for row in journal.rows if row.stage == ALL), key=lambda row: row.index)
+        rows = [row for row in asked if row.cost < INFEASIBLE]
         x, y = np.array([r.terms[i] for r in rows]), np.array([r.terms[j] for r in rows])
         chosen = front(x, y)
         values = np.array([rows[k].values for k in chosen]).reshape(
@@ -222,7 +235,7 @@ class _Tuning:
         return Pareto(spec.x, spec.y, x[chosen], y[chosen], values, x, y)
 
     # -- schedule -------------------------------------------------------------------------------------
-    def _schedule(self, evaluator: Evaluator) -> ScheduleResult:
+    def _schedule(self, engine: Engine) -> ScheduleResult:
         spec, space = self.scenario.schedule, self.scenario.parameters
         assert spec is not None
         axes = [axis for axis in self.scenario.axes if axis.name in spec.over]
@@ -240,13 +253,13 @@ class _Tuning:
                 gain_units={p.name: p.unit for p in space.parameters},
             )
 
-        strength, allowed = spec.smoothing, self._broken(evaluator, best)
+        strength, allowed = spec.smoothing, self._broken(engine, best)
         for _ in range(WEAKER):
             columns = [
                 smooth(best[:, k].reshape(shape), nodes, strength).ravel() for k in range(space.dimension)
             ]
             drawn = np.stack(columns, axis=1)
-            if strength == 0.0 or self._broken(evaluator, drawn) <= allowed + 1e-12:
+            if strength == 0.0 or self._broken(engine, drawn) <= allowed + 1e-12:
                 break
             strength /= 4.0
         else:
@@ -255,26 +268,26 @@ class _Tuning:
         if 0.0 < strength < spec.smoothing:
             self.notes.append(f"The smoothing was lowered to {strength:g} to keep the hard requirements.")
         final = schedule(drawn)
-        return ScheduleResult(final, schedule(best), strength, self._check(evaluator, final))
+        return ScheduleResult(final, schedule(best), strength, self._check(engine, final))
 
-    def _broken(self, evaluator: Evaluator, vectors: FloatArray) -> float:
+    def _broken(self, engine: Engine, vectors: FloatArray) -> float:
         """By how much the nodes' gains (k, n) in the unit cube break hard requirements, summed."""
         space, requirements = self.scenario.parameters, self.scenario.requirements
         total = 0.0
         for group, vector in zip(self.groups[1:], vectors, strict=True):
             limits = replace(group, requirements=requirements)
-            found = evaluator.evaluate(limits, [space.decode(np.clip(vector, 0.0, 1.0))])[0].combined
+            found = evaluate(engine, limits, [space.decode(np.clip(vector, 0.0, 1.0))])[0].combined
             hard = [x for r, x in zip(requirements, found.excess.tolist(), strict=True) if r.hard]
             total += sum(hard) if np.isfinite(found.eq7) else np.inf
         return total
 
-    def _check(self, evaluator: Evaluator, schedule: GainSchedule) -> ScheduleCheck:
+    def _check(self, engine: Engine, schedule: GainSchedule) -> ScheduleCheck:
         spec = self.scenario
         conditions = tuple(case.condition.shown for case in self.check.cases)
         constant = {"best single set": self._gains(0), **spec.compare, "before": spec.before}
         sets = [[schedule.at(c) for c in conditions]]
         sets += [[dict(values)] * len(conditions) for values in constant.values()]
-        found = evaluator.evaluate_each(self.check, sets)
+        found = evaluate_each(engine, self.check, sets)
         scored = [self._score(name, f) for name, f in zip(["schedule", *constant], found, strict=True)]
         if not scored[0].feasible:
             broken = ", ".join(name for name, x in scored[0].excess.items() if x > 0.0)
@@ -284,7 +297,7 @@ class _Tuning:
     # -- result ---------------------------------------------------------------------------------------
     def result(self) -> TuneResult:
         """Everything found so far."""
-        scenario, evaluator = self.scenario, self.evaluator
+        scenario, engine = self.scenario, self.engine
         by_name = {s.name: s for s in self.scored}
         after = by_name.get("after")
         self.notes += [note for k in sorted(self.found) for note in self._at_bounds(k)]
@@ -306,8 +319,8 @@ class _Tuning:
             surface=self.surface,
             pareto=self.pareto,
             schedule=self.schedule,
-            evaluations=0 if evaluator is None else evaluator.evaluations,
-            failures={} if evaluator is None else evaluator.failures,
+            evaluations=0 if engine is None else engine.evaluations.total(),
+            failures={} if engine is None else engine.failures,
             notes=tuple(self.notes),
             settings={
                 **scenario.search.model_dump(),

@@ -6,6 +6,9 @@ equation
   actuator.v_cmd = min(0.030*time, 0.009);
   actuator.F_load = 55e3;
   actuator.T_amb = -30;
+  actuator.T_motor = -300;
+  actuator.T_gearbox = -300;
+  actuator.T_screw = -300;
   v = actuator.v;
   annotation(
     experiment(StartTime=0, StopTime=1.2, Tolerance=1e-6, Interval=1e-3),

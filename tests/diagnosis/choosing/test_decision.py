@@ -105,16 +105,16 @@ def test_a_candidate_whose_response_is_exactly_zero_is_not_testable():
     """A coefficient that nothing depends on: friction in proportion to a load that is never there."""
     offered = candidates("windage", "load-dependent-friction")
     own = bench(offered, WINDAGE)
-    real = own._runner.run  # type: ignore[attr-defined]
+    real = own._engine._runner.run  # type: ignore[attr-defined]
 
     def deaf(jobs, on_outcome=None):  # type: ignore[no-untyped-def]
         kept = [
             type(j)(j.experiment, {k: v for k, v in j.values.items() if "loadDependentFriction" not in k})
             for j in jobs
         ]
-        return real(kept)
+        return real(kept, on_outcome)
 
-    own._runner.run = deaf  # type: ignore[attr-defined, method-assign]
+    own._engine._runner.run = deaf  # type: ignore[attr-defined, method-assign]
     found = attribute(own, unknowns(), offered, lambda _: {}, seed=1)
     assert found is not None
     assert [s.candidate.effect.name for s in found.accepted] == ["windage"]

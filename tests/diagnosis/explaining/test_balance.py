@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from scipy.integrate import quad
 
-from thsa_cosim.diagnosis.explaining.balance import close_balances
+from thsa_cosim.diagnosis.explaining.balance import close_balances, formulas_of, record_of
 from thsa_cosim.diagnosis.results import Balance
 from thsa_cosim.errors import ScenarioError
 from thsa_cosim.scenario import Scenario, load_scenario
@@ -229,3 +229,15 @@ def test_formulas_have_the_values_of_their_operations():
     for text, wanted in expected.items():
         found = parse_formula(text, values, "key")(values, 1e-4)
         np.testing.assert_allclose(found[1:-1], wanted[1:-1], atol=1e-9, err_msg=text)
+
+
+def test_the_same_noise_is_drawn_whatever_the_order_of_a_set(tmp_path: Path):
+    """Strings hash differently in every process, and noise is drawn signal by signal."""
+    scenario = scenario_of(tmp_path, table(), ELECTRICAL)
+    assert scenario.diagnose is not None
+    (spec,) = scenario.diagnose.balances
+    (recording,) = scenario.fit
+    found = record_of(recording, spec, formulas_of(scenario, spec))
+    assert found is not None
+    assert list(found.values) == sorted(found.values)
+    assert len(found.values) > 2

@@ -14,8 +14,8 @@ from thsa_cosim.costs.channels import Channel
 from thsa_cosim.diagnosis.explaining import experiment as room
 from thsa_cosim.diagnosis.explaining.profiles import Range, input_range, profiles, travel
 from thsa_cosim.diagnosis.fitting.trials import Trial
-from thsa_cosim.identify.problem import Case
 from thsa_cosim.signals import Signals
+from thsa_cosim.study import Case
 
 TIME = np.arange(8001) * 1e-3
 NOISE = 0.05

@@ -9,14 +9,15 @@ import pytest
 from scipy.optimize import least_squares
 
 from thsa_cosim.batch import Job, Outcome, Status
+from thsa_cosim.batch.runner import OnOutcome
 from thsa_cosim.costs.channels import Channel
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
-from thsa_cosim.identify.problem import Case
 from thsa_cosim.signals import Signals
+from thsa_cosim.study import Case
 
 TIME = np.linspace(0.0, 4.0, 401)
 NOISE = 0.01
@@ -42,7 +43,7 @@ class Formula:
     jobs: list[Job] = field(default_factory=list)
     notes: tuple[str, ...] = ()
 
-    def run(self, jobs: Sequence[Job], on_outcome: object = None) -> list[Outcome]:
+    def run(self, jobs: Sequence[Job], on_outcome: OnOutcome | None = None) -> list[Outcome]:
         self.jobs += jobs
         outcomes = []
         for job in jobs:
@@ -52,6 +53,9 @@ class Formula:
             else:
                 residual = (self.model(job.values) - MEASURED[part]) / NOISE
                 outcomes.append(Outcome(Status.OK, "", None, residual, 0.0, ""))
+        for index, outcome in enumerate(outcomes):
+            if on_outcome is not None:
+                on_outcome(index, outcome)
         return outcomes
 
     def close(self) -> None:

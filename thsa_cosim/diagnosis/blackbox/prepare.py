@@ -13,9 +13,9 @@ from thsa_cosim.diagnosis.catalogue.candidate import Candidate, candidates_of
 from thsa_cosim.diagnosis.catalogue.effect import Effect
 from thsa_cosim.errors import StudyError
 from thsa_cosim.fmu import FmuDescription
-from thsa_cosim.identify.problem import Case
 from thsa_cosim.scenario import BlackBoxSpec, Executor, Scenario, SimulationTable
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.study import Case
 
 #: The step of the load that shows what a load costs, in the largest load of the recordings.
 STEP = 0.01

@@ -18,10 +18,9 @@ from thsa_cosim.errors import StudyError
 from thsa_cosim.export import export_fmu
 from thsa_cosim.export.compile import this_platform
 from thsa_cosim.fmu import read_description
-from thsa_cosim.identify.problem import Case
 from thsa_cosim.scenario import Executor, Scenario, SimulationTable
 from thsa_cosim.signals import Signals
-from thsa_cosim.study import export_digest, is_made_from, note_made_from
+from thsa_cosim.study import Case, export_digest, is_made_from, note_made_from
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,13 +1,63 @@
-"""Vectors of unknowns → residuals of the recordings, by batches over a runner."""
+"""Vectors of unknowns → residuals of the recordings, by batches over an engine."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from thsa_cosim.batch import Job, Runner, Status
+from thsa_cosim.batch import Job, Outcome, Runner
 from thsa_cosim.diagnosis.fitting.trials import Part, Trial
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.study import Engine, Reply, Request, Want, stacked
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Unknowns that are fitted to trials; a problem of the engine, whose vectors are in the unknowns' units.
+
+    ``fixed``: start values of every simulation.
+    """
+
+    trials: tuple[Trial, ...]
+    unknowns: Unknowns
+    fixed: Mapping[str, float]
+    label: str = "fit"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the unknowns."""
+        return self.unknowns.names
+
+    @property
+    def size(self) -> int:
+        """Number of recordings."""
+        return len(self.trials)
+
+    @property
+    def samples(self) -> int:
+        """Number of residuals N."""
+        return sum(channel.measured.size for trial in self.trials for channel in trial.case.channels)
+
+    def decode(self, vectors: FloatArray) -> FloatArray:
+        """Values as they are."""
+        return vectors
+
+    def jobs(
+        self, want: Want, values: Sequence[Mapping[str, float]], overrides: Mapping[str, float]
+    ) -> list[Job]:
+        """One simulation per recording."""
+        keep = want is Want.SIGNALS
+        jobs = []
+        for trial, own in zip(self.trials, values, strict=True):
+            assigned = self.unknowns.assignments(np.array(list(own.values())), trial.group)
+            jobs.append(Job(trial.name, {**self.fixed, **assigned, **overrides}, keep_signals=keep))
+        return jobs
+
+    def judge(self, want: Want, outcomes: Sequence[Outcome]) -> tuple[float, FloatArray]:
+        """Sum of squared residuals; infinite if a simulation failed. It has no terms."""
+        residual = stacked(outcomes)
+        return np.inf if residual is None else float(residual @ residual), np.zeros(0)
 
 
 class Bench:
@@ -17,13 +67,18 @@ class Bench:
         self, runner: Runner, trials: Sequence[Trial], fixed: Mapping[str, float] | None = None
     ) -> None:
         self.trials = tuple(trials)
-        self.evaluations = 0
         self.failures: dict[str, int] = {}
-        self._runner = runner
+        """Failed simulations by reason, in the order in which the reasons came up."""
+        self._engine = Engine(runner)
         self.notes = tuple(runner.notes)
         self._fixed = dict(fixed or {})
         self.weights: Mapping[str, float] = {}
         """Factors of the channels' residuals, 1 where none is given."""
+
+    @property
+    def evaluations(self) -> int:
+        """Simulations so far."""
+        return self._engine.runs
 
     def factors(self, part: Part) -> FloatArray:
         """(N,) what the stacked residuals of ``part`` are multiplied by."""
@@ -44,32 +99,19 @@ class Bench:
 
         Simulated minus measured, in standard deviations of the noise, times the channel's factor.
         """
-        trials = self.of(part)
-        jobs = [
-            Job(t.name, {**self._fixed, **unknowns.assignments(vector, t.group)})
-            for vector in vectors
-            for t in trials
-        ]
-        outcomes = self._runner.run(jobs)
-        self.evaluations += len(jobs)
-        factors = self.factors(part) if self.weights else None
-        found: list[FloatArray | None] = []
-        for k in range(len(vectors)):
-            parts: list[FloatArray] = []
-            for outcome in outcomes[k * len(trials) : (k + 1) * len(trials)]:
-                if outcome.status == Status.OK and outcome.reduced is not None:
-                    parts.append(outcome.reduced)
-                else:
-                    self.failures[outcome.reason] = self.failures.get(outcome.reason, 0) + 1
-            residual = np.concatenate(parts) if len(parts) == len(trials) else None
-            found.append(residual if residual is None or factors is None else residual * factors)
-        return found
+        reply = self._ask(Want.RESIDUALS, self.of(part), unknowns, vectors)
+        if not self.weights:
+            return list(reply.residuals)
+        factors = self.factors(part)
+        return [None if residual is None else residual * factors for residual in reply.residuals]
 
     def signals(self, unknowns: Unknowns, vector: FloatArray) -> dict[str, Signals | None]:
         """The simulated outputs of every recording, by experiment name; None where the run failed."""
-        jobs = [
-            Job(t.name, {**self._fixed, **unknowns.assignments(vector, t.group)}, keep_signals=True)
-            for t in self.trials
-        ]
-        self.evaluations += len(jobs)
-        return {t.name: o.signals for t, o in zip(self.trials, self._runner.run(jobs), strict=True)}
+        reply = self._ask(Want.SIGNALS, self.trials, unknowns, vector[None, :])
+        return {t.name: o.signals for t, o in zip(self.trials, reply.outcomes[0], strict=True)}
+
+    def _ask(self, want: Want, trials: tuple[Trial, ...], unknowns: Unknowns, vectors: FloatArray) -> Reply:
+        reply = self._engine.ask(Fitted(trials, unknowns, self._fixed), Request(want, vectors))
+        for outcome in (o for own in reply.outcomes for o in own if not o.ok):
+            self.failures[outcome.reason] = self.failures.get(outcome.reason, 0) + 1
+        return reply

@@ -8,8 +8,8 @@ from typing import Literal
 from thsa_cosim.batch import Experiment, Wrapper
 from thsa_cosim.costs.channels import ResidualReducer
 from thsa_cosim.errors import ScenarioError
-from thsa_cosim.identify.problem import Case, build_case
 from thsa_cosim.scenario import DiagnoseSpec, Scenario
+from thsa_cosim.study import Case, build_case
 
 Part = Literal["fit", "validate"]
 

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from thsa_cosim.identify.results import ChannelError, IdentifyResult, LawResult, PointResult
+from thsa_cosim.identify.results import IdentifyResult, LawResult, PointResult
 from thsa_cosim.laws import Law
 from thsa_cosim.report.files import plain, write_csv
+from thsa_cosim.study import ChannelError
 
 
 def identify_to_dict(result: IdentifyResult) -> dict[str, Any]:

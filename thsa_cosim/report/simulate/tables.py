@@ -4,9 +4,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from thsa_cosim.identify.results import ChannelError
 from thsa_cosim.report.parts.text import number, percent
-from thsa_cosim.simulate import ChannelFit, SimulateResult
+from thsa_cosim.simulate import SimulateResult
+from thsa_cosim.study import ChannelError
 
 
 def print_simulate(console: Console, result: SimulateResult) -> None:
@@ -27,7 +27,7 @@ def print_simulate(console: Console, result: SimulateResult) -> None:
         console.print(Text(f"note: {note}"), highlight=False)
 
 
-def error_cells(error: ChannelError | ChannelFit) -> tuple[str, str, str, str]:
+def error_cells(error: ChannelError) -> tuple[str, str, str, str]:
     """Rmse, noise, their ratio and the share of the range, as text."""
     unit = f" {error.unit}"
     ratio = error.rmse / error.noise if error.noise > 0.0 else None

@@ -6,7 +6,7 @@ from pathlib import Path
 from thsa_cosim.report.files import RESULT, write_json
 from thsa_cosim.report.page.pictures import write_pictures
 from thsa_cosim.report.signal_files import write_signals
-from thsa_cosim.report.tune.result import tune_to_dict, write_check_csv, write_pareto_csv
+from thsa_cosim.report.tune.result import tune_to_dict, write_check_csv, write_pareto_csv, write_start_csv
 from thsa_cosim.report.tune.schedule_files import write_schedule
 from thsa_cosim.signals import Signals
 from thsa_cosim.tune import TuneResult
@@ -28,6 +28,9 @@ def write_tune(result: TuneResult, folder: Path, on_file: Callable[[Path], None]
     if result.pareto is not None and result.pareto.x.size:
         write_pareto_csv(folder / "pareto.csv", result, result.pareto)
         note(folder / "pareto.csv")
+    if result.scenario.start is not None and result.after is not None:
+        write_start_csv(folder / "start.csv", result)
+        note(folder / "start.csv")
     if result.schedule is not None:
         for path in write_schedule(folder, result.schedule.schedule, result.scenario.title):
             note(path)

@@ -1,26 +1,54 @@
-"""Simulated against measured: per recording and channel, and over all recordings of a role."""
+"""Simulated against measured: per recording and signal, and over all recordings of a role."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from thsa_cosim.costs import nrmse, rmse, signal_range
-from thsa_cosim.identify.problem import Case
-from thsa_cosim.identify.results import ChannelError, Comparison
 from thsa_cosim.inspection import Residual
 from thsa_cosim.recordings import Recording
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.study.case import Case
 
 
-def compare(case: Case, recording: Recording, role: str, simulated: Signals) -> Comparison:
-    """Errors of every measured signal over all samples; a signal that is not fitted has its estimated noise."""
-    measured = case.measured
-    noise = {channel.name: channel.noise for channel in case.channels}
-    on_samples = simulated.select(measured.names).resample(measured.time)
+@dataclass(frozen=True)
+class ChannelError:
+    """How well a measured signal is met: rmse and noise (1 σ) in ``unit``, nrmse over the measured range."""
+
+    rmse: float
+    nrmse: float
+    noise: float
+    unit: str
+    samples: int
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Measured and simulated signals of one recording, each channel (n,) in the FMU variable's unit."""
+
+    recording: str
+    role: str
+    temperature_degC: float | None
+    measured: Signals
+    simulated: Signals
+    errors: Mapping[str, ChannelError]
+
+
+def compare(
+    recording: Recording, role: str, names: Sequence[str], noise: Mapping[str, float], simulated: Signals
+) -> Comparison:
+    """Errors of the named signals over all samples after the lead-in that the simulation reached.
+
+    ``noise``: 1 σ by signal; one that is not there has the recording's own estimate.
+    """
+    reached = simulated.time[-1] * (1.0 + 1e-12) + 1e-9
+    whole = recording.compared.select(names)
+    measured = whole if whole.time[-1] <= reached else whole.window(stop=reached)
+    on_samples = simulated.select(names).resample(measured.time)
     errors = {}
-    for name in measured.names:
-        kept = recording.counted(name)
+    for name in names:
+        kept = recording.counted(name)[: len(measured)]
         errors[name] = ChannelError(
             rmse=rmse(measured[name][kept], on_samples[name][kept]),
             nrmse=nrmse(measured[name][kept], on_samples[name][kept]),
@@ -28,14 +56,13 @@ def compare(case: Case, recording: Recording, role: str, simulated: Signals) -> 
             unit=measured.units[name],
             samples=int(np.count_nonzero(kept)),
         )
-    return Comparison(
-        recording=case.name,
-        role=role,
-        temperature_degC=case.temperature_degC,
-        measured=measured,
-        simulated=on_samples,
-        errors=errors,
-    )
+    return Comparison(recording.name, role, recording.temperature_degC, measured, on_samples, errors)
+
+
+def compare_case(case: Case, recording: Recording, role: str, simulated: Signals) -> Comparison:
+    """The same of a recording as a case, whose fitted signals have a noise."""
+    noise = {channel.name: channel.noise for channel in case.channels}
+    return compare(recording, role, case.measured.names, noise, simulated)
 
 
 def case_residuals(

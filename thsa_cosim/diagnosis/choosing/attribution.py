@@ -98,7 +98,7 @@ def attribute(
         while offered:
             taken = {s.candidate.key for s in accepted}
             selection = Selection(bench, weights, current, current_held, say)
-            left = [c for c in offered if c.key not in taken]
+            left = [c for c in offered if c.key not in taken and not _is_known(c, current)]
             rounds.append(
                 _round(selection, left, scan(current), seed + len(rounds), accepted, offered is candidates)
             )
@@ -132,6 +132,11 @@ def attribute(
         weights.plain(current_held, "validate"),
         tuple(notes),
     )
+
+
+def _is_known(candidate: Candidate, fit: Fit) -> bool:
+    """Whether a coefficient of the candidate is in the model already, by another variant of its effect."""
+    return any(p.variable in fit.unknowns.names for p in candidate.coefficients)
 
 
 def further_parts(accepted: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -67,6 +67,24 @@ def other_places(winner: Proposal, proposals: Sequence[Proposal]) -> list[Propos
     return list(found.values())
 
 
+def simplest_first(scored: Sequence[Scored], ties: Callable[[Scored, Scored], bool]) -> list[Scored]:
+    """``scored``, best first, but before the best the simplest form of its effect there that explains as much.
+
+    ``ties``: whether the first explains as much as the second, within the uncertainty.
+    """
+    ordered = list(scored)
+    for other in sorted(scored[1:], key=lambda s: len(s.candidate.coefficients)):
+        best, own = ordered[0].candidate, other.candidate
+        same = (own.effect.name, own.slot.name, own.component) == (
+            best.effect.name,
+            best.slot.name,
+            best.component,
+        )
+        if same and len(own.coefficients) < len(best.coefficients) and ties(other, ordered[0]):
+            return [other, *(s for s in ordered if s is not other)]
+    return ordered
+
+
 @dataclass(frozen=True, eq=False)
 class Selection:
     """A round against the model so far: its fit ``current`` and its held-out residuals ``held`` (N,)."""
@@ -92,7 +110,7 @@ class Selection:
                     solved = max(solved, result.fit_gain, proposal.gain)
         most = max((s.fit_gain for s in scored), default=0.0)
         scored = [self._go_on(s) if s.fit_gain > RIVAL_WORTH * most else s for s in scored]
-        return sorted(scored, key=lambda s: -s.held_out_gain)
+        return simplest_first(sorted(scored, key=lambda s: -s.held_out_gain), self._ties)
 
     def evidence(self, one: Scored) -> Evidence:
         """What speaks for a candidate."""

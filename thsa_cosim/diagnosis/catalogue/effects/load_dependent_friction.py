@@ -17,6 +17,9 @@ def _variant(*parameters: EffectParameter, beside: bool) -> Variant:
     return Variant("FrictionEffect", "LoadDependentFriction", parameters, law=friction, beside=beside)
 
 
+MU = EffectParameter("mu", "1", 0.01, "friction per load", lower=0.0, upper=0.9)
+GROWTH = EffectParameter("mu_2", "1/F", 0.01, "growth of the friction per load with the load", lower=0.0)
+
 EFFECT = Effect(
     name="load-dependent-friction",
     title="Friction in proportion to the load that the pair carries",
@@ -24,7 +27,9 @@ EFFECT = Effect(
     source="Coulomb; Lemor, SNAME 1996 (roller screws); Duclusaud et al., ICRA 2025 (gears, models m3 to m6)",
     signature="current grows with the load beyond the declared lossless transmission",
     variants=(
-        _variant(EffectParameter("mu", "1", 0.01, "friction per load", lower=0.0, upper=0.9), beside=False),
+        _variant(MU, beside=False),
+        # Where losses grow faster than the load, a share of the load alone may explain less than what is no friction.
+        _variant(MU, GROWTH, beside=False),
         _variant(
             EffectParameter(
                 "mu_S", "1", 0.01, "breakaway part of the friction per load", lower=0.0, upper=0.9
@@ -41,9 +46,6 @@ EFFECT = Effect(
             ),
             beside=True,
         ),
-        _variant(
-            EffectParameter("mu_2", "1/F", 0.01, "growth of the friction per load with the load", lower=0.0),
-            beside=True,
-        ),
+        _variant(GROWTH, beside=True),
     ),
 )

@@ -18,6 +18,7 @@ from thsa_cosim.tune.start import start_terms
 
 if TYPE_CHECKING:  # workers import this module
     from thsa_cosim.scenario import TuneScenario
+    from thsa_cosim.scenario.tune_model import CommandSpec
     from thsa_cosim.scenario.tune_schema import StartTable
 
 
@@ -109,6 +110,7 @@ class ResponseReducer:
     terms: Terms
     output: str
     command: FloatArray
+    ends_at_most: bool
     begin: float
     factor: float
     scale: float
@@ -142,12 +144,13 @@ class ResponseReducer:
             scale=self.scale,
         )
         final = float(self.command[-1])
+        settled = settling_time(time, response, final, self.settling_band, start=self.begin)
+        of_the_end = (cost.rise_time, cost.overshoot, settled) if self.ends_at_most else (np.nan,) * 3
         found = [
             cost.tracking,
-            cost.rise_time,
+            of_the_end[0],
             cost.steady_state_error,
-            cost.overshoot,
-            settling_time(time, response, final, self.settling_band, start=self.begin),
+            *of_the_end[1:],
             float(np.max(np.abs(self.command - response))) / self.scale,
         ]
         if self.terms.effort is not None:
@@ -162,15 +165,16 @@ class ResponseReducer:
 
 
 def reducer(
-    scenario: "TuneScenario", inputs: Mapping[str, float], fixed: Mapping[str, float]
+    scenario: "TuneScenario", inputs: Signals, fixed: Mapping[str, float], command: "CommandSpec"
 ) -> ResponseReducer:
-    """The reducer of one condition: its constant ``inputs`` and ``fixed`` start values, in the FMU's units."""
-    command, metrics = scenario.command, scenario.metrics
-    loop = scenario.loop
+    """The reducer of one condition: its ``inputs``, its ``command`` and ``fixed`` start values, in the FMU's units."""
+    metrics, loop = scenario.metrics, scenario.loop
+    others = [name for name in inputs.names if name != command.input]
     return ResponseReducer(
         terms=Terms.of(scenario),
         output=command.output,
         command=command.values,
+        ends_at_most=command.ends_at_most,
         begin=command.begin,
         factor=command.factor,
         scale=scenario.cost.scale,
@@ -185,7 +189,7 @@ def reducer(
             # A worker has a working directory of its own.
             replace(scenario.fmu, path=scenario.fmu.path.resolve()),
             fixed,
-            inputs,
+            {name: float(np.interp(loop.at, inputs.time, inputs[name])) for name in others},
             command.input,
             tuple(p.variable for p in scenario.parameters.parameters),
             loop.gains,

@@ -114,6 +114,13 @@ def test_an_offset_is_proposed_in_the_unit_of_the_file(file_unit: str | None, re
         assert size == pytest.approx(float(remedy.split(" = ")[1]), rel=0.1)
 
 
+def test_a_delay_that_parameters_hide_in_the_noise_is_named_all_the_same() -> None:
+    residuals = fitted({"u": late(1.5e-3)})
+    assert all(np.sqrt(np.mean(r.values**2)) < 1.4 for r in residuals)  # rmse / noise says nothing
+    found = only(misfits(residuals))
+    assert (found.channel, found.kind) == ("u", "delay")
+
+
 def test_two_slips_are_two_findings() -> None:
     found = misfits(fitted({"i": lambda x: x + 0.02, "u": lambda x: x - 3.0}))
     assert [(f.channel, f.kind) for f in found] == [("u", "offset"), ("i", "offset")]

@@ -146,6 +146,12 @@ class _Rest:
         self._basis = np.column_stack((self._basis, free))
 
     @property
+    def chance(self) -> float:
+        """By how much the sum of squares of white noise may be larger than expected: three standard deviations."""
+        counts = (f * f * r.values.size for f, r in zip(self.floors, self.own, strict=True))
+        return 3.0 * float(np.sqrt(2.0 * sum(counts)))
+
+    @property
     def excess(self) -> float:
         """What is left beyond white noise, as a sum of squares over this recording."""
         parts = (float(self.values[s] @ self.values[s]) for s in self.rows)
@@ -208,9 +214,9 @@ def _recording(rest: _Rest, file_units: Mapping[str, str | None]) -> Iterator[Fi
             return
         floor = max(rest.floors)
         least = _UNIT_SHARE if best.kind in ("gain", "common-delay") else _SHARE
-        if best.gain < _SURE * floor or best.gain < least * excess:
+        if best.gain < _SURE * floor or best.gain < least * (excess - rest.chance):
             return
-        share = best.gain / excess
+        share = min(best.gain / excess, 1.0)
         settled = _settled_delay(rest, best) if best.kind.endswith("delay") else best
         finding = _finding(rest, settled, share, file_units)
         if finding is None:

@@ -39,8 +39,9 @@ def quantum(values: FloatArray) -> float:
     if gaps.size == 0:
         return 0.0
     step = float(np.median(gaps[gaps <= 1.5 * gaps.min()]))
-    multiples = gaps / step
-    off_lattice = np.abs(multiples - np.round(multiples)) > 0.05
+    with np.errstate(over="ignore", invalid="ignore"):
+        multiples = gaps / step
+        off_lattice = ~(np.abs(multiples - np.round(multiples)) <= 0.05)
     return step if np.mean(off_lattice) <= 0.01 else 0.0
 
 

@@ -23,7 +23,7 @@ class Table(BaseModel):
         frozen=True,
         allow_inf_nan=False,
         regex_engine="python-re",
-        use_attribute_docstrings=True,  # what a key means stands below it; docs/scenario.md is made from that
+        defer_build=True,  # one kind of study needs the tables of one kind
     )
 
     @model_validator(mode="before")

@@ -8,6 +8,7 @@ from typing import Literal
 
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.parameters import ParameterSpace
+from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario.schema import SearchTable, SimulationTable
 from thsa_cosim.scenario.tune_schema import (
     LineTable,
@@ -19,7 +20,7 @@ from thsa_cosim.scenario.tune_schema import (
     SurfaceTable,
     TuneTable,
 )
-from thsa_cosim.signals import FloatArray
+from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.units import convert
 
 
@@ -37,13 +38,29 @@ class CommandSpec:
     values: FloatArray
     begin: float
     factor: float
+    ends_at_most: bool = True
+    """Whether the last value is the largest: a recorded profile that goes on has no rise, overshoot or settling."""
+
+
+PROFILE = "profile"
+"""The axis whose values are the numbers of the recorded profiles."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A recording that drives responses: ``inputs`` of the FMU in its units, without the command; its ``command``."""
+
+    recording: Recording
+    inputs: Signals
+    command: CommandSpec
 
 
 @dataclass(frozen=True)
 class Axis:
     """One condition's values in ``unit`` (as in the scenario) with their weights; the FMU's unit may differ.
 
-    ``is_input``: an input of the FMU that stays constant, else a parameter.
+    ``is_input``: an input of the FMU that stays constant, else a parameter. The axis :data:`PROFILE` is neither: it
+    numbers the recorded profiles from 1.
     """
 
     name: str
@@ -82,7 +99,7 @@ def combinations(axes: Sequence[Axis]) -> tuple[Condition, ...]:
         for axis, k in zip(axes, picks, strict=True):
             weight *= axis.weights[k]
         inputs = {a.name: a.to_fmu(shown[a.name]) for a in axes if a.is_input}
-        values = {a.name: a.to_fmu(shown[a.name]) for a in axes if not a.is_input}
+        values = {a.name: a.to_fmu(shown[a.name]) for a in axes if not a.is_input and a.name != PROFILE}
         conditions.append(Condition(shown, inputs, values, weight))
     return tuple(conditions)
 
@@ -194,4 +211,14 @@ class TuneScenario:
     surface: SurfaceTable | None
     search: SearchTable
     simulation: SimulationTable
+    profiles: tuple[Profile, ...] = ()
     kind: str = "tune"
+
+    def profile_of(self, shown: Mapping[str, float]) -> Profile | None:
+        """The recorded profile of a condition's ``shown`` values, if it has one."""
+        return self.profiles[int(shown[PROFILE]) - 1] if PROFILE in shown else None
+
+    def command_of(self, shown: Mapping[str, float]) -> CommandSpec:
+        """The command under a condition: the profile's, or the scenario's."""
+        profile = self.profile_of(shown)
+        return self.command if profile is None else profile.command

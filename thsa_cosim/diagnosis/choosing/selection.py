@@ -195,7 +195,7 @@ class Selection:
                 evidence = self.evidence(one)
             why = objection_beside(evidence, limit) if beside else objection(evidence, limit, first)
             if not why:
-                one = one if whole else self._whole(one, apart=first and not objections)
+                one = one if whole else self._whole(one)
                 why = insignificant(one)
                 if not why and (name := out_of_range(one.fit)):
                     why = f"{one.candidate.name}: it drives the declared parameter {name} to the end of its range"
@@ -231,9 +231,9 @@ class Selection:
                 rivals[name] = polished
         return tuple(rivals.values())
 
-    def _whole(self, one: Scored, apart: bool = False) -> Scored:
+    def _whole(self, one: Scored) -> Scored:
         self.say(f"fitting {one.candidate.name} with all parameters")
-        return polish(self.bench, one, self.current, self.held, apart=apart)
+        return polish(self.bench, one, self.current, self.held)
 
     def _go_on(self, one: Scored) -> Scored:
         return go_on(self.bench, one, self.current, self.held)

@@ -221,7 +221,7 @@ def _cases(scenario: Scenario) -> list[tuple[Recording, str, Experiment]]:
                 inputs=scenario.drive(recording),
                 outputs=scenario.outputs,
                 time=communication_points(scenario, recording),
-                fixed={**fixed, **start},
+                fixed={**fixed, **start, **recording.start},
                 tolerance=scenario.simulation.tolerance,
             )
             cases.append((recording, role, experiment))

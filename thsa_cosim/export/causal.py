@@ -378,13 +378,13 @@ class _Builder:
         if not initial.blocks and not {str(s) for s in ca.symvar(initial.x)} & modes:
             return ca.SX(0, 1)
         unknown = [b.unknown.nz[i] for b in self.system.blocks for i in range(b.unknown.numel())]
-        guesses = [initial.guesses[n] for b in self.system.blocks for n in b.names]
+        guesses = [initial.guesses.get(n, ca.SX(0)) for b in self.system.blocks for n in b.names]
         moved = ca.substitute([indicators], [x, column(unknown)], [initial.x_start, column(guesses)])[0]
         return moved
 
     def _z_start(self, name: str) -> ca.SX:
         if name in self.split.starts:
-            return self._at(self.flat.variables[name].place, self.split.starts[name])
+            return self._at(self.flat.variables[name].place, Term("noEvent", (self.split.starts[name],)))
         variable = self.flat.variables.get(name)
         if variable is None:
             return self.memory.updates[name]

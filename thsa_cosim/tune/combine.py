@@ -37,13 +37,18 @@ class Combined:
 
 
 def equation_7(scenario: TuneScenario, names: Sequence[str], terms: FloatArray) -> FloatArray:
-    """J = Σ ½ (v - v̂)² + κ1 t_r + κ2 |e_ss| (c,) from terms (c, q); NaN where a term is undefined."""
+    """J = Σ ½ (v - v̂)² + κ1 t_r + κ2 |e_ss| (c,) from terms (c, q); NaN where a term that counts is undefined."""
     cost = scenario.cost
     tracking, rise, steady = (
         terms[:, names.index(n)] for n in ("tracking", "rise_time", "steady_state_error")
     )
     size = steady if cost.signed else np.abs(steady)
-    return np.asarray(tracking + cost.kappa_rise * rise + cost.kappa_steady * size)
+    total = tracking.copy()
+    # A recorded profile may end at rest: it has no rise and no steady state, and no weight on them.
+    for weight, term in ((cost.kappa_rise, rise), (cost.kappa_steady, size)):
+        if weight > 0.0:
+            total = total + weight * term
+    return np.asarray(total)
 
 
 def worst_of(names: Sequence[str], terms: FloatArray) -> FloatArray:

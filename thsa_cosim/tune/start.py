@@ -1,16 +1,20 @@
 """The start from rest after a soak: when something moves, what current that takes, what the drive has left."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from thsa_cosim.costs import first_reach
-from thsa_cosim.scenario.tune_schema import StartTable
 from thsa_cosim.signals import Signals
+
+if TYPE_CHECKING:
+    from thsa_cosim.scenario.tune_schema import StartTable
 
 MOVED = 1e-3
 """Share of the largest value below which the last one is rest: the signal then did not stay in motion."""
 
 
-def start_terms(spec: StartTable, signals: Signals, output: str, begin: float) -> list[float]:
+def start_terms(spec: "StartTable", signals: Signals, output: str, begin: float) -> list[float]:
     """The terms that ``spec`` names, from one run; NaN for those of a start that does not come.
 
     ``output`` is the signal that must move; ``begin`` in s is when the command starts. Breakaway current is the

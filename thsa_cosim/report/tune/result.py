@@ -55,6 +55,7 @@ def tune_to_dict(result: TuneResult) -> dict[str, Any]:
             "input": scenario.command.input,
         },
         "conditions": {axis.name: {"unit": axis.unit, "values": list(axis.values)} for axis in scenario.axes},
+        "profiles": [profile.recording.name for profile in scenario.profiles],
         "term_units": term_units(result),
         "groups": [
             {
@@ -144,7 +145,7 @@ def write_start_csv(path: Path, result: TuneResult) -> None:
 
 def condition_key(name: str, unit: str) -> str:
     """``temperature_degC`` for a condition in degC, else ``F_load_kN``: what a row of the schedule calls it."""
-    return "temperature_degC" if unit == "degC" else f"{name}_{unit}"
+    return "temperature_degC" if unit == "degC" else f"{name}_{unit}" if unit else name
 
 
 def _schedule_rows(result: TuneResult) -> list[dict[str, Any]]:

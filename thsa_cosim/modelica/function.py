@@ -454,7 +454,9 @@ class Statements:
             after, left = self.run(body, env)
             if isinstance(chosen, Term):
                 if left == "return":
-                    raise self._error(statement, "a return out of such a while loop is a limit of this exporter.")
+                    raise self._error(
+                        statement, "a return out of such a while loop is a limit of this exporter."
+                    )
                 if left != "break":
                     after, _ = self._while(statement, after, unknown + 1)
                 return self._merged(chosen, after, env, statement), ""

@@ -252,8 +252,8 @@ Status solver_advance(Instance *c, double end) {
         }
         const long events = c->events;
         if (instance_update_modes(c) != OK) return DISCARD;
-        if (c->events != events || landing) { /* a landing without a change: g is rounding noise there */
-            restarted = c->events != events;
+        if (c->events != events) {
+            restarted = 1;
             if (now->time - last_event > fmax(1e-6 * now->step, 4.0 * blind)) rapid = 0, blind = 0.0;
             last_event = now->time;
             if (++rapid == MOST_RAPID)

@@ -113,6 +113,8 @@ class LawResult:
     """What the law does between the points' temperatures that its material does not."""
     published_doubts: tuple[Doubt, ...] = ()
     """The same of the published law."""
+    between: tuple[float, float] | None = None
+    """degC: the ends of the recorded temperatures, of a law that was searched as such."""
 
 
 @dataclass(frozen=True)

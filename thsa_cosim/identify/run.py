@@ -11,7 +11,7 @@ from thsa_cosim import __version__
 from thsa_cosim.batch import Journal
 from thsa_cosim.errors import InputError, StudyError
 from thsa_cosim.identify.force import force_balance
-from thsa_cosim.identify.over_temperature import fit_laws, values_at
+from thsa_cosim.identify.over_temperature import all_laws, values_at
 from thsa_cosim.identify.parameter_set import parameter_set
 from thsa_cosim.identify.point import PointSearch, search_point
 from thsa_cosim.identify.problem import (
@@ -299,7 +299,7 @@ class _Search:
         return 0 if self._engine is None else self._engine.evaluations[self._points[k].label]
 
     def _laws(self) -> tuple[dict[str, LawResult], list[str]]:
-        return fit_laws(self._results(), self._scenario.laws)
+        return all_laws(self._results(), self._scenario.laws, self._scenario.parameters)
 
     def _fit_comparisons(self) -> list[Comparison]:
         comparisons = []

@@ -2,8 +2,8 @@
 
 Coefficients of a cubic law in degC differ by nine orders of magnitude and are all but collinear. A polynomial is
 therefore searched by its values at as many temperatures (nodes); an exponential α exp(β t) by its value at the cold
-end and its rate β, a second term by its value at the warm end and by what its rate is above the first one's: as neither term
-can take the place of the other, every law has one set of unknowns.
+end and its rate β, a second term by its value at the warm end and by what its rate is above the first one's: as neither
+term can take the place of the other, every law has one set of unknowns.
 """
 
 from collections.abc import Mapping, Sequence
@@ -74,17 +74,16 @@ class SearchedLaw:
 
     def _value(self, temperature: float, coefficient: str, *, share: bool = False) -> Parameter:
         p = self.parameter
-        lower = p.lower
-        if share:  # of a sum of terms one may be next to nothing
-            lower = 1e-3 * p.lower if p.scale == "log" else min(0.0, p.lower)
-        name = f"{p.name}.{coefficient}" if share else p.name
+        name, lower, scale = p.name, p.lower, p.scale
+        if share:  # of a sum of terms one may be next to nothing, where a log scale would have no end
+            name, lower, scale = f"{p.name}.{coefficient}", min(0.0, p.lower), "linear"
         return Parameter(
             f"{name}({temperature:.4g} degC)",
             f"{self.block}.{coefficient}",
             p.unit,
             lower,
             p.upper,
-            p.scale,
+            scale,
             None if share else p.start,
             f"{p.description} at {temperature:.4g} degC".strip(),
             p.variable_unit,

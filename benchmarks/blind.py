@@ -37,7 +37,7 @@ from blind_units import STRENGTHS, generate_unit
 ROOT = Path(__file__).resolve().parents[1]
 OURS = Path(sys.executable).with_name("thsa-cosim")
 SEEDS = 3  # units of each effect and strength
-CLEAN, PAIRS = 54, 36
+CLEAN, PAIRS = 60, 36
 #: Effects whose traces differ too little to ask for two of them: torque that misses in proportion to the load, or by
 #: a constant; friction that fades along the stroke; drag at speed; one sensor's errors.
 _ALIKE = (

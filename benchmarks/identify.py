@@ -89,11 +89,12 @@ def scenario_of(recording: Path, *, linear: bool) -> Scenario:
     scenario = load_scenario(SCENARIO, fit=[recording])
     scenario = replace(
         scenario,
-        search=replace(scenario.search, method="differential-evolution"),
-        cost=replace(
-            scenario.cost,
-            channels={name: scenario.cost.channels[name] for name in CHANNELS},
-            mask=tuple(spans(moving(scenario), scenario.fit[0].signals.time)),
+        search=scenario.search.model_copy(update={"method": "differential-evolution"}),
+        cost=scenario.cost.model_copy(
+            update={
+                "channels": {name: scenario.cost.channels[name] for name in CHANNELS},
+                "mask": [list(span) for span in spans(moving(scenario), scenario.fit[0].signals.time)],
+            }
         ),
     )
     if not linear:

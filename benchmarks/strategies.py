@@ -46,7 +46,8 @@ def main() -> None:
     options = parser.parse_args()
 
     scenario = load_scenario(options.scenario)
-    scenario = replace(scenario, cost=replace(scenario.cost, stop=options.seconds))
+    window = scenario.cost.window.model_copy(update={"stop": options.seconds})
+    scenario = replace(scenario, cost=scenario.cost.model_copy(update={"window": window}))
     points = [build_point(scenario, p) for p in scenario.points if p.temperature_degC in options.points]
     experiments = []
     for point in points:

@@ -19,8 +19,10 @@ if TYPE_CHECKING:
         compare,
         diagnose,
         identify,
+        init,
         list_studies,
         open_study,
+        sensitivity,
         simulate,
         tune,
     )
@@ -37,8 +39,10 @@ __all__ = [
     "compare",
     "diagnose",
     "identify",
+    "init",
     "list_studies",
     "open_study",
+    "sensitivity",
     "simulate",
     "tune",
 ]

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from thsa_cosim import __version__
 from thsa_cosim.batch import Experiment, Job, Outcome
 from thsa_cosim.errors import StudyError
-from thsa_cosim.inspection import Residual, Trust, judge
+from thsa_cosim.inspection import Inspection, Residual, Trust, judge, misfits
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario
 from thsa_cosim.signals import FloatArray, Signals
@@ -65,6 +66,19 @@ class SimulateResult:
     files: tuple[Path, ...]
     notes: tuple[str, ...] = ()
 
+    @cached_property
+    def data(self) -> Inspection:
+        """What is wrong with the recordings, and which slip of a signal explains what the model leaves of them."""
+        found = self.scenario.data
+        known = {(f.recording, f.channel, f.kind) for f in found.findings}
+        slips = [
+            f
+            for r in self.recordings
+            for f in misfits(_residuals(self.scenario, r), self.scenario.file_units)
+        ]
+        slips = [f for f in slips if (f.recording, f.channel, f.kind) not in known]
+        return Inspection.of((*found.findings, *slips), found.repairs)
+
     @property
     def trust(self) -> Trust:
         """Whether the model leaves nothing but noise of the fit recordings (of all, without any)."""
@@ -82,7 +96,7 @@ class SimulateResult:
             "failures": dict(self.failures),
             "fmu": {"path": str(self.scenario.fmu.path), "sha256": self.scenario.fmu.sha256},
             "version": __version__,
-            "data": self.scenario.data.to_dict(),
+            "data": self.data.to_dict(),
             "trust": self.trust.to_dict(),
             "notes": list(self.notes),
             "recordings": [
@@ -217,7 +231,8 @@ def _cases(scenario: Scenario) -> list[tuple[Recording, str, Experiment]]:
 def _compare(scenario: Scenario, recording: Recording, role: str, outcome: Outcome) -> SimulatedRecording:
     errors: Mapping[str, ChannelError] = {}
     if outcome.signals is not None:
-        given = {name: c.noise for name, c in scenario.cost.channels.items() if c.noise is not None}
+        own = {name: channel.given_noise for name, channel in scenario.cost.channels.items()}
+        given = {name: noise for name, noise in own.items() if noise is not None}
         errors = compare(recording, role, scenario.measured, given, outcome.signals).errors
     return SimulatedRecording(
         name=recording.name,
@@ -256,6 +271,9 @@ def _residuals(scenario: Scenario, found: SimulatedRecording) -> list[Residual]:
                 noise,
                 found.errors[name].unit,
                 {n: inputs[n] for n in inputs.names},
+                time[kept],
+                simulated,
+                np.empty((int(np.sum(kept)), 0)),  # nothing is fitted here
             )
         )
     return residuals

@@ -1,4 +1,4 @@
-"""Parameter sets as SSV files: System Structure and Parameterization 1.0, ``SystemStructureParameterValues``.
+"""Parameter sets as SSV files: System Structure and Parameterization 1.0 (reading: 2.0, too).
 
 Source: Modelica Association, *System Structure and Parameterization* 1.0 (2019), section 6, and its XSD.
 """
@@ -14,6 +14,14 @@ from thsa_cosim.units import base_exponents
 
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
+FLOATS = ("Real", "Float64", "Float32")
+"""Real of SSP 1.0, and the types of FMI 3.0 that SSP 2.0 adds."""
+_NUMBERS = (
+    *FLOATS,
+    "Integer",
+    "Boolean",
+    *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)),
+)
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,7 @@ def write_ssv(path: Path, parameters: ParameterSet) -> None:
 
 
 def read_ssv(path: Path) -> ParameterSet:
-    """Read an SSV 1.x file; Real, Integer and Boolean values come back as floats.
+    """Read an SSV file (1.0 or 2.0); numbers and Boolean values come back as floats.
 
     Raises
     ------
@@ -96,7 +104,7 @@ def parse_ssv(root: ET.Element, path: Path | str) -> ParameterSet:
         if name in values:
             raise ParameterError(f"{path}: parameter {name!r} is set twice; remove one.")
         values[name] = _number(path, name, parameter)
-        real = parameter.find(f"{{{SSV}}}Real")
+        real = next((e for kind in FLOATS for e in parameter.iterfind(f"{{{SSV}}}{kind}")), None)
         if real is not None and real.get("unit"):
             units[name] = _known_unit(path, name, real.get("unit", ""))
     return ParameterSet(root.get("name", ""), values, units, root.get("description", ""))
@@ -113,7 +121,7 @@ def _known_unit(path: Path | str, name: str, unit: str) -> str:
 def _number(path: Path | str, name: str, parameter: ET.Element) -> float:
     child = next(iter(parameter), None)
     kind = "nothing" if child is None else child.tag.removeprefix(f"{{{SSV}}}")
-    if child is None or kind not in ("Real", "Integer", "Boolean"):
+    if child is None or kind not in _NUMBERS:
         raise ParameterError(f"{path}: parameter {name!r} holds {kind}; only numbers can be set.")
     text = child.get("value", "").strip()
     if kind == "Boolean" and text in ("true", "false"):

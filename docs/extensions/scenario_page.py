@@ -4,10 +4,14 @@ A key's meaning is the docstring below it; a table's introduction is the docstri
 table as it stands in the file, then a colon. Tables and keys that several kinds share are described once.
 """
 
+import ast
 import inspect
+import itertools
 import json
 import re
+import textwrap
 from collections.abc import Iterator
+from functools import cache
 from types import NoneType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
@@ -42,13 +46,13 @@ def scenario_page() -> str:
     return "\n".join([HEAD, *(part for root in ROOTS.values() for part in _section(root, "", covered))])
 
 
-def tables(table: type[Table], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
-    """Every key below ``table`` that holds a value, in full, with its field."""
+def tables(table: type[Table], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Every key below ``table`` that holds a value, in full, with its meaning."""
     for name, field in table.model_fields.items():
         key = prefix + (field.alias or name)
         inside, between = table_inside(field.annotation)
         if inside is None:
-            yield key, field
+            yield key, meaning(table, name)
         else:
             yield from tables(inside, f"{key}{between}.")
 
@@ -81,7 +85,7 @@ def _section(table: type[Table], prefix: str, covered: set[object]) -> Iterator[
             continue
         covered.add(known)
         if inside is None:
-            rows.append(_row(key, field))
+            rows.append(_row(key, field, meaning(table, name)))
         else:
             below.append((inside, f"{key}{between}."))
     if rows:
@@ -97,9 +101,27 @@ def _owner(table: type[Table], name: str) -> type:
     return next(c for c in reversed(table.__mro__) if name in inspect.get_annotations(c))
 
 
-def _row(key: str, field: FieldInfo) -> str:
-    meaning = re.sub(r"\s+", " ", (field.description or "").replace("``", "`")).strip().replace("|", r"\|")
-    return f"| `{key}` | {_type(field.annotation, field.metadata)} | {default(field)} | {meaning} |"
+def meaning(table: type[Table], name: str) -> str:
+    """What stands below a key in the class that declares it."""
+    return _docstrings(_owner(table, name)).get(name, "")
+
+
+@cache
+def _docstrings(table: type) -> dict[str, str]:
+    """Docstrings of a class's attributes; pydantic would look for them whenever the package is imported."""
+    body = ast.parse(textwrap.dedent(inspect.getsource(table))).body[0].body
+    return {
+        key.target.id: inspect.cleandoc(below.value.value)
+        for key, below in itertools.pairwise(body)
+        if isinstance(key, ast.AnnAssign)
+        and isinstance(below, ast.Expr)
+        and isinstance(below.value, ast.Constant)
+    }
+
+
+def _row(key: str, field: FieldInfo, text: str) -> str:
+    shown = re.sub(r"\s+", " ", text.replace("``", "`")).strip().replace("|", r"\|")
+    return f"| `{key}` | {_type(field.annotation, field.metadata)} | {default(field)} | {shown} |"
 
 
 def default(field: FieldInfo) -> str:

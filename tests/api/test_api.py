@@ -217,8 +217,10 @@ def test_names_of_the_package() -> None:
         "compare",
         "diagnose",
         "identify",
+        "init",
         "list_studies",
         "open_study",
+        "sensitivity",
         "simulate",
         "tune",
     ]

@@ -153,3 +153,19 @@ def test_a_study_in_which_no_effect_could_be_tried_leaves_with_3(
     monkeypatch.setattr(StudyOptions, "conclude", lambda self, what: concluded.append(what))
     assert cli.run_command(["diagnose", str(DRIVEN), "-o", str(tmp_path / "study")]) == code
     assert concluded == [done], "the result is shown all the same"
+
+
+def test_a_further_recording_is_fitted_in_addition_to_the_scenarios_or_the_given_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    asked: list[tuple[Path, ...]] = []
+    done = SimpleNamespace(open=lambda: SimpleNamespace(result={"verdict": "missing-effect"}))
+    monkeypatch.setattr(StudyOptions, "ask", lambda self, *given: asked.append(self.fit))
+    monkeypatch.setattr(StudyOptions, "conduct", lambda *given: done)
+    monkeypatch.setattr(StudyOptions, "conclude", lambda *given: None)
+    for more in ([], ["--with", "new.csv"], ["--fit", "a.csv", "--with", "new.csv", "--with", "b.csv"]):
+        assert cli.run_command(["diagnose", str(DRIVEN), *more]) == 0
+    own = sorted((DRIVEN.parent / "recordings").glob("undeclared_fit_*.parquet"))
+    assert own
+    names = [[path.name for path in fit] for fit in asked]
+    assert names == [[], [*(p.name for p in own), "new.csv"], ["a.csv", "new.csv", "b.csv"]]

@@ -31,8 +31,8 @@ def test_pages_that_follow_from_the_code_are_up_to_date(name: str) -> None:
 @pytest.mark.parametrize("root", ROOTS)
 def test_every_key_of_a_scenario_says_what_it_means(root: str) -> None:
     page = (DOCS / "scenario.md").read_text(encoding="utf-8")
-    for key, field in tables(ROOTS[root]):
-        assert field.description, f"{key} has no docstring in thsa_cosim/scenario"
+    for key, meaning in tables(ROOTS[root]):
+        assert meaning, f"{key} has no docstring in thsa_cosim/scenario"
         parts = key.split(".")  # of a table that was described before, the table is named
         assert any(f"`{'.'.join(parts[:k])}`" in page for k in range(len(parts), 0, -1)), key
 

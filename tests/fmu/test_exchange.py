@@ -164,3 +164,39 @@ def test_error_follows_the_tolerance() -> None:
     for error, tolerance in zip(errors, (1e-4, 1e-6, 1e-8), strict=True):
         assert error < 20.0 * tolerance
     assert errors[2] < 1e-2 * errors[0]
+
+
+def test_fmi1_inputs_are_applied_at_every_right_hand_side() -> None:
+    inputs = Signals(RAMP, {"u": RAMP**2}, {})
+    exact = lag(RAMP, inputs["u"], 0.05, 2.0)
+    with Plant.open(build.exchange1()) as plant:
+        assert plant.kind == "model-exchange"
+        for count in (11, 101):
+            time = np.linspace(0.0, 1.0, count)
+            found = plant.run({"tau": 0.05, "k": 2.0}, inputs, ["y"], time, tolerance=1e-7)
+            assert np.max(np.abs(found["y"][:: count // 10] - exact)) < 2e-6
+
+
+def test_fmi1_state_and_time_events() -> None:
+    time = np.linspace(0.0, 1.2, 241)
+    with Plant.open(build.exchange1()) as plant:
+        found = plant.run({"at": 0.5}, None, ["h", "v", "bounces", "late"], time, tolerance=1e-9)
+        again = plant.run({"at": 0.5}, None, ["h"], time, tolerance=1e-9)
+    first = np.sqrt(2.0 / 9.81)
+    later = time[time > first] - first
+    up = 0.7 * 9.81 * first
+    expected = np.concatenate(
+        (1.0 - 0.5 * 9.81 * time[time <= first] ** 2, up * later - 0.5 * 9.81 * later**2)
+    )
+    assert np.max(np.abs(found["h"] - expected)[time < first + 2.0 * up / 9.81]) < 1e-7
+    assert np.array_equal(found["bounces"], 1.0 * (time > first) + (time > first + 2.0 * up / 9.81))
+    assert np.array_equal(found["late"], 1.0 * (time >= 0.5))
+    assert np.array_equal(again["h"], found["h"])
+    assert found.units["h"] == "m"
+
+
+def test_fmi1_says_why_it_cannot_be_instantiated() -> None:
+    with Plant.open(build.exchange1("{other}")) as plant, pytest.raises(SimulationFailure) as caught:
+        plant.run({}, None, ["y"], RAMP)
+    assert caught.value.status is Status.LOAD_ERROR
+    assert "The GUID {other} is wrong" in caught.value.reason

@@ -219,6 +219,53 @@ LAG1 = """<?xml version="1.0" encoding="UTF-8"?>
 </fmiModelDescription>
 """
 
+EXCHANGE1 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="1.0" modelName="Exchange1" modelIdentifier="exchange1" guid="{guid}"
+  numberOfContinuousStates="3" numberOfEventIndicators="1">
+ <UnitDefinitions><BaseUnit unit="m"><DisplayUnitDefinition displayUnit="mm" gain="1000"/></BaseUnit></UnitDefinitions>
+ <DefaultExperiment startTime="0" stopTime="2" tolerance="1e-6"/>
+ <ModelVariables>
+  <ScalarVariable name="tau" valueReference="0" variability="parameter"><Real start="0.1"/></ScalarVariable>
+  <ScalarVariable name="k" valueReference="1" variability="parameter"><Real start="1"/></ScalarVariable>
+  <ScalarVariable name="u" valueReference="2" causality="input"><Real start="0"/></ScalarVariable>
+  <ScalarVariable name="at" valueReference="3" variability="parameter"><Real start="1e9"/></ScalarVariable>
+  <ScalarVariable name="y" valueReference="4" causality="output"><Real/></ScalarVariable>
+  <ScalarVariable name="h" valueReference="5" causality="output"><Real unit="m" displayUnit="mm"/></ScalarVariable>
+  <ScalarVariable name="v" valueReference="6"><Real/></ScalarVariable>
+  <ScalarVariable name="bounces" valueReference="0" causality="output" variability="discrete"><Integer/>
+  </ScalarVariable>
+  <ScalarVariable name="late" valueReference="0" causality="output" variability="discrete"><Boolean/></ScalarVariable>
+ </ModelVariables>
+</fmiModelDescription>
+"""
+
+STRICT2 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Strict" guid="{strict}" generationTool="a stickler">
+ <CoSimulation modelIdentifier="strict2" canBeInstantiatedOnlyOncePerProcess="true"/>
+ <TypeDefinitions><SimpleType name="Order"><Enumeration><Item name="one" value="1"/><Item name="two" value="2"/>
+   <Item name="three" value="3"/></Enumeration></SimpleType></TypeDefinitions>
+ <DefaultExperiment startTime="0" stopTime="1" stepSize="0.01"/>
+ <ModelVariables>
+  <ScalarVariable name="x" valueReference="0" causality="output" variability="continuous" initial="exact">
+    <Real start="0" unit="m"/></ScalarVariable>
+  <ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
+  <ScalarVariable name="tau" valueReference="2" causality="parameter" variability="fixed"><Real start="0.5"/>
+  </ScalarVariable>
+  <ScalarVariable name="gain" valueReference="3" causality="parameter" variability="tunable"><Real start="1"/>
+  </ScalarVariable>
+  <ScalarVariable name="time" valueReference="4" causality="independent" variability="continuous"><Real/>
+  </ScalarVariable>
+  <ScalarVariable name="order" valueReference="0" causality="parameter" variability="fixed">
+    <Enumeration declaredType="Order" start="1"/></ScalarVariable>
+  <ScalarVariable name="on" valueReference="0" causality="parameter" variability="fixed"><Boolean start="false"/>
+  </ScalarVariable>
+  <ScalarVariable name="text" valueReference="0" causality="output" variability="discrete" initial="calculated">
+    <String/></ScalarVariable>
+ </ModelVariables>
+ <ModelStructure/>
+</fmiModelDescription>
+"""
+
 
 def compiler() -> list[str] | None:
     """Return a C compiler's command, or None if there is none."""
@@ -311,3 +358,18 @@ def events2() -> Path:
 def lag1() -> Path:
     """The first-order lag of lag1.c, FMI 1.0 Co-Simulation."""
     return write_fmu(_folder() / "lag1.fmu", LAG1, library("lag1.c"), "lag1")
+
+
+@cache
+def exchange1(guid: str = "{exchange1}") -> Path:
+    """The lag and the ball of exchange1.c, FMI 1.0 Model Exchange."""
+    name = "exchange1" + ("" if guid == "{exchange1}" else "_bad")
+    xml = EXCHANGE1.replace("{guid}", guid)
+    return write_fmu(_folder() / f"{name}.fmu", xml, library("exchange1.c"), "exchange1")
+
+
+@cache
+def strict2() -> Path:
+    """The lag of strict2.c, FMI 2.0 Co-Simulation: an FMU that refuses all that the standard does not allow."""
+    resources = {"resources/factor.txt": b"1.5"}
+    return write_fmu(_folder() / "strict2.fmu", STRICT2, library("strict2.c"), "strict2", resources)

@@ -19,7 +19,7 @@ from thsa_cosim.study import Comparison
 
 ROOT = Path(__file__).parents[2]
 EMPS = ROOT / "scenarios" / "emps.toml"
-SPEC = ForceSpec("q", "F", "M", 95.0, 20.0, period=2.0)
+SPEC = ForceSpec(position="q", force="F", mass="M", mass_at_start=95.0, period=2.0)
 STEP, TIME = 1e-3, np.arange(0.0, 6.0, 1e-3)
 TRUE = {"M": 120.0, "F_v": 320.0, "F_c": 12.0, "F_0": 4.0}
 
@@ -109,7 +109,7 @@ def test_the_residual_is_told_by_role_with_what_laps_differ_by() -> None:
 
 
 def test_without_laps_nothing_is_said_of_them_and_without_recordings_nothing_at_all() -> None:
-    single = ForceSpec("q", "F", "M", 95.0, 20.0)
+    single = ForceSpec(position="q", force="F", mass="M", mass_at_start=95.0)
     found = force_balance(single, [comparison("fit", np.sin(2 * np.pi * TIME))], [95.0])
     assert found is not None
     assert math.isnan(found.repeatability)

@@ -4,6 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.random import Generator
+from scipy.interpolate import CubicSpline
+from scipy.signal import resample_poly
 
 from thsa_cosim.recordings import noise_estimate
 from thsa_cosim.signals import FloatArray
@@ -96,3 +98,43 @@ def hum(time: FloatArray, x: FloatArray, rng: Generator) -> FloatArray:
 def noisy_end(time: FloatArray, x: FloatArray, rng: Generator) -> FloatArray:
     late = np.arange(x.size) > rng.integers(x.size // 2, 3 * x.size // 4)
     return x + late * rng.normal(0, rng.uniform(2.5, 6.0) * noise_estimate(x), x.size)
+
+
+@defect("interpolated-samples")
+def upsampled_by_a_spline(time: FloatArray, x: FloatArray, rng: Generator) -> FloatArray:
+    knots = np.arange(0, x.size, rng.choice([3, 4]))
+    return CubicSpline(knots, x[knots])(np.arange(x.size))
+
+
+@defect("interpolated-samples")
+def upsampled_by_a_filter(time: FloatArray, x: FloatArray, rng: Generator) -> FloatArray:
+    factor = int(rng.choice([3, 4]))
+    fine = resample_poly(x[::factor] - x[0], factor, 1) + x[0]
+    return fine[: x.size]
+
+
+@defect("held-samples")
+def held_at_no_fixed_rate(time: FloatArray, x: FloatArray, rng: Generator) -> FloatArray:
+    fresh = np.cumsum(rng.integers(3, 8, x.size))
+    index = np.zeros(x.size, dtype=int)
+    index[fresh[fresh < x.size]] = fresh[fresh < x.size]
+    return x[np.maximum.accumulate(index)]
+
+
+@defect("held-samples")
+def held_from_the_middle_on(time: FloatArray, x: FloatArray, rng: Generator) -> FloatArray:
+    held = x[np.arange(x.size) // 8 * 8]
+    return np.where(np.arange(x.size) < x.size // 2, x, held)
+
+
+@defect("dropouts")
+def packets_lost(time: FloatArray, x: FloatArray, rng: Generator) -> FloatArray:
+    x = x.copy()
+    for first in rng.choice(x.size - 40, x.size // 150, replace=False) + 1:
+        x[first : first + rng.integers(8, 20)] = x[first - 1]
+    return x
+
+
+@defect("unequal-noise")
+def noise_that_grows(time: FloatArray, x: FloatArray, rng: Generator) -> FloatArray:
+    return x + np.linspace(0.0, rng.uniform(4.0, 8.0), x.size) * rng.normal(0.0, noise_estimate(x), x.size)

@@ -101,6 +101,26 @@ def test_a_slip_is_named_with_its_size(
         assert float(proposed) == pytest.approx(float(size), rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("file_unit", "remedy"), [("mA", "offset = -80"), ("A", "offset = -0.08"), (None, "write it")]
+)
+def test_an_offset_is_proposed_in_the_unit_of_the_file(file_unit: str | None, remedy: str) -> None:
+    found = only(misfits(fitted({"i": lambda x: x + 0.08}), {"i": file_unit}))
+    assert found.kind == "offset"
+    line = found.remedy.splitlines()[1]
+    assert remedy.split(" = ")[0] in line
+    if file_unit:
+        size = float(line.partition(" = ")[2].partition("#")[0])
+        assert size == pytest.approx(float(remedy.split(" = ")[1]), rel=0.1)
+
+
+def test_a_delay_that_parameters_hide_in_the_noise_is_named_all_the_same() -> None:
+    residuals = fitted({"u": late(1.5e-3)})
+    assert all(np.sqrt(np.mean(r.values**2)) < 1.4 for r in residuals)  # rmse / noise says nothing
+    found = only(misfits(residuals))
+    assert (found.channel, found.kind) == ("u", "delay")
+
+
 def test_two_slips_are_two_findings() -> None:
     found = misfits(fitted({"i": lambda x: x + 0.02, "u": lambda x: x - 3.0}))
     assert [(f.channel, f.kind) for f in found] == [("u", "offset"), ("i", "offset")]

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from thsa_cosim.errors import RecordingError
 from thsa_cosim.recordings import Column, TimeAxis, noise_estimate, quantum, read_recording
+from thsa_cosim.recordings.repair import Repair
 
 RATE = 0.01
 
@@ -28,6 +29,18 @@ def ramp(tmp_path):
 def read(file, columns, **axis):
     units = {"line": "m/s", "step": "m/s", "T": "K"}
     return read_recording(file, columns, time=TimeAxis("t", "s", **axis), units=units)
+
+
+@pytest.mark.parametrize("number", [1e200, -1.7976931348623157e308])
+def test_numbers_that_nothing_measures_are_refused_until_they_are_called_missing(tmp_path, number):
+    rows = np.column_stack([np.arange(100) * RATE, np.sin(np.arange(100.0)), np.zeros(100), np.zeros(100)])
+    rows[40, 1] = number
+    file = tmp_path / "run.csv"
+    np.savetxt(file, rows, delimiter=";", header="t;line;step;T", comments="", fmt="%.17g")
+    with pytest.raises(RecordingError, match=r"at 0\.4 s.*which nothing measures.*missing"):
+        read(file, {"line": Column("line", "m/s")})
+    mended = Column("line", "m/s", repair=Repair(missing=(number,)))
+    assert np.max(np.abs(read(file, {"line": mended}).signals["line"])) < 2.0
 
 
 def test_time_starts_at_zero_or_where_the_file_starts(ramp):

@@ -1,8 +1,14 @@
 """A page's figure as a matplotlib figure: the same numbers in the same places."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from thsa_cosim.report.parts import drawing
+from thsa_cosim.report.parts.axes import Panel
 from thsa_cosim.report.parts.chart import BEFORE, Chart
 from thsa_cosim.report.parts.drawing import draw
 
@@ -47,3 +53,33 @@ def test_contours_leave_out_what_is_not_known() -> None:
     chart.add(0, 0, "", type="contour", x=[0.0, 1.0], y=[0.0, 1.0], z=z, ncontours=5)
     chart.axes(x="a [1]", y="b [1]")
     assert draw(chart.build("")).axes[0].get_xlabel() == "a [1]"
+
+
+def test_a_png_is_read_back_as_its_pixels(tmp_path: Path) -> None:
+    from PIL import Image
+
+    pixels = np.random.default_rng(3).integers(0, 256, (37, 53, 3), dtype=np.uint8)
+    (tmp_path / "noise.png").write_bytes(drawing.png(pixels))
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "noise.png")), pixels)
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_ticks_in_one_go_are_where_matplotlib_puts_them(scale: str) -> None:
+    """Beside matplotlib's own axes of the same data: marks, grid and spines in the same pixels."""
+
+    def drawn(kind: type[Axes]) -> np.ndarray:
+        sheet = drawing.Drawing(figsize=(4.0, 3.0), dpi=130)
+        axes = sheet.add_axes(kind(sheet, (0.2, 0.2, 0.7, 0.7)))
+        axes.plot([1.0, 40.0], [2.0, 3000.0])
+        axes.set_yscale(scale)
+        axes.grid(True, color="0.9", lw=0.6)
+        axes.tick_params(labelsize=8)
+        canvas = FigureCanvasAgg(sheet)
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[:, :, :3].astype(int)
+
+    ours, theirs = drawn(Panel), drawn(Axes)
+    inside = (slice(20, 312), slice(104, 468))  # labels and their place are drawn by other rules
+    assert np.mean(np.any(ours[inside] != theirs[inside], axis=2)) < 2e-3
+    assert np.mean(np.any(ours != theirs, axis=2)) < 0.02
+    assert np.any(ours != 255)

@@ -76,7 +76,8 @@ def test_a_valid_scenario_in_full(folder):
     assert (law.form, law.published, law.compared_form) == ("linear", [1.2, 0.03], "linear")
     assert scenario.cost.channels["w_m"].noise == 0.2
     assert scenario.cost.channels["i_q"].weight == 2.0
-    assert (scenario.cost.start, scenario.cost.stop, scenario.cost.mask) == (0.0, 0.4, ((0.1, 0.12),))
+    window = scenario.cost.window
+    assert (window.start, window.stop, scenario.cost.mask) == (0.0, 0.4, [[0.1, 0.12]])
     assert (scenario.search.population, scenario.search.strategy) == (20, "best1bin")
     assert (scenario.search.mutation, scenario.search.crossover, scenario.search.generations) == (
         0.16,

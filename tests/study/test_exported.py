@@ -1,5 +1,6 @@
 """FMUs that a study keeps: known again by all that they were made from, and by their own content."""
 
+import hashlib
 import json
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError
@@ -49,6 +50,14 @@ def test_what_takes_no_part_in_an_export_does_not_count(package: Path) -> None:
     (package / "notes.txt").write_text("not Modelica")
     (package / "package.mo").write_bytes((package / "package.mo").read_bytes().replace(b"\n", b"\r\n"))
     assert digest(package) == before == digest(Path(package.rename(package.with_name("Moved"))))
+
+
+def test_the_note_says_what_the_fmu_is_made_from(tmp_path: Path) -> None:
+    fmu = tmp_path / "Model.fmu"
+    fmu.write_bytes(b"an FMU")
+    note_made_from(fmu, "d")
+    note = json.loads((tmp_path / "Model.made-from.json").read_text(encoding="utf-8"))
+    assert note == {"made from": "d", "sha256": hashlib.sha256(b"an FMU").hexdigest()}
 
 
 def test_the_class_the_platforms_and_the_tools_count(

@@ -1,23 +1,29 @@
 """What makes two runs the same study: every key of every kind counts, and files count by their content."""
 
+import json
 import shutil
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
+import numpy as np
 import pytest
 from small_scenario import toml, valid, write_folder
 
+from thsa_cosim import __version__
 from thsa_cosim.scenario import KINDS, Table, load_scenario
 from thsa_cosim.scenario import load as load_any
 from thsa_cosim.scenario.schema import StagesTable
 from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.ssv import ParameterSet, write_ssv
-from thsa_cosim.study import stages_identity, study_identity
+from thsa_cosim.study import digest_of_recording, identity, stages_identity, study_identity
+from thsa_cosim.study.digest import digest_of_folder
 from thsa_cosim.study.folder import changed
-from thsa_cosim.study.identity import BY_CONTENT, SHOWN_ONLY, flatten
+from thsa_cosim.study.identity import BY_CONTENT, SHOWN_ONLY, _plain, flatten
 
 ALL_KINDS: dict[str, type[Table]] = {**KINDS, "tune": TuneTable, "stages": StagesTable}
 #: Keys of a kind that are read off a scenario's table: fewer would mean that the walk below has lost some.
@@ -185,3 +191,201 @@ def test_stages_count_with_all_that_they_ask(folder: Path) -> None:
     stages.write_text(toml({"kind": "identify", "stages": [{"scenario": "one.toml", "give": ["J"]}]}))
     again = stages_identity(load_any(stages))  # type: ignore[arg-type]
     assert changed(after, again) == ["stages[one].give"]
+
+
+# -- the identity itself, key by key ---------------------------------------------------------------------
+def tuning() -> dict[str, Any]:
+    gain = {"unit": "A.s/rad", "lower": 0.01, "upper": 1.0}
+    return {
+        "kind": "tune",
+        "fmu": "Small.fmu",
+        "command": {
+            "input": "w_cmd",
+            "output": "w_m",
+            "unit": "rad/s",
+            "shape": "step",
+            "final": 9.0,
+            "stop": 1.0,
+        },
+        "conditions": {"T_amb": {"values": [-30.0, 20.0], "unit": "degC"}},
+        "parameters": [{"name": "K_p", "variable": "velocityController.K_p", **gain}],
+        "before": {"K_p": 0.12},
+        "metrics": {"window": [0.8, 1.0]},
+        "cost": {"unit": "rad/s", "kappa_rise": 1.0, "kappa_steady": 1.0},
+        "parameter_set": "start.ssv",
+        "uncertainty": {
+            "result": "result.json",
+            "samples": 2,
+            "temperature": "T_amb",
+            "variables": {"J": "motor.J"},
+        },
+    }
+
+
+@pytest.fixture
+def identified(folder: Path) -> Path:
+    """The result of an identification, as far as a tuning reads it."""
+    point = {
+        "temperature_degC": 20.0,
+        "parameters": {"J": {"value": 2e-3, "stderr": 1e-4, "unit": "kg.m2"}},
+        "correlation": [[1.0]],
+    }
+    (folder / "result.json").write_text(json.dumps({"points": [point]}))
+    return folder / "result.json"
+
+
+def test_a_tuning_counts_its_start_values_and_how_sure_they_are(folder: Path, identified: Path) -> None:
+    before = study_identity(load(folder, tuning()))
+    assert before["kind"] == "tune"
+    assert before["start values.motor.gain"] == 2.0
+    assert before["before.K_p"] == 0.12
+    assert before["conditions.T_amb.values"] == [-30.0, 20.0]
+    assert len(before["uncertainty.result"]) == 64
+    assert study_identity(load(folder, tuning())) == before
+    edit(identified, "0.0001", "0.0002")
+    assert changed(before, study_identity(load(folder, tuning()))) == ["uncertainty.result"]
+    edit(identified, "0.0002", "0.0001")
+    EDITS["start values.motor.gain"](folder)
+    assert changed(before, study_identity(load(folder, tuning()))) == ["start values.motor.gain"]
+    sure = study_identity(load(folder, {k: v for k, v in tuning().items() if k != "uncertainty"}))
+    assert not [key for key in sure if key.startswith("uncertainty")]
+
+
+def test_a_scenario_is_asked_key_by_key(folder: Path) -> None:
+    scenario = load(folder, valid())
+    asked = study_identity(scenario)
+    expected = {
+        "kind": "identify",
+        "seed": 3,
+        "fmu": scenario.fmu.sha256,
+        "temperature.input": "T_amb",
+        "temperature.round_to": 1.0,
+        "fixed.velocityController.K_p": 0.12,
+        "start values.velocityController.K_p": 0.12,
+        "parameters (order)": ["R_s", "J"],
+        "parameters[R_s].lower": 0.05,
+        "parameters[R_s].law.form": "linear",
+        "parameters[R_s].law.published": [1.2, 0.03],
+        "parameters[J].scale": "log",
+        "cost.channels (order)": ["i_q", "w_m"],
+        "cost.channels.i_q.weight": 2.0,
+        "cost.channels.w_m.noise": 0.2,
+        "cost.mask": [[0.1, 0.12]],
+        "recordings.columns.T_amb.unit": "degC",
+        "recordings.fit (order)": [r.name for r in scenario.fit],
+        "recordings.validate (order)": ["check"],
+        "recordings.validate[check]": digest_of_recording(scenario.validate[0]),
+        "versions.thsa-cosim": __version__,
+        "versions.numpy": version("numpy"),
+        "versions.scipy": version("scipy"),
+        "versions.fmpy": version("fmpy"),
+    }
+    assert {key: asked.get(key) for key in expected} == expected
+    assert not [key for key in asked if "title" in key or "description" in key or "diagnose" in key]
+    json.dumps(asked, allow_nan=False)
+
+
+def test_only_a_diagnosis_counts_the_model_and_the_effects(folder: Path) -> None:
+    scenario = load(folder, diagnosis())
+    content = {key for key in study_identity(scenario) if key in ("diagnose.package", "diagnose.catalogue")}
+    assert content == {"diagnose.package", "diagnose.catalogue"}
+    other = study_identity(scenario, "identify")
+    assert (other["kind"], "diagnose.package" in other, "diagnose.catalogue" in other) == (
+        "identify",
+        False,
+        False,
+    )
+    assert other["diagnose.model"] == "Small"
+
+
+def test_a_start_value_of_one_temperature_counts_by_its_name(folder: Path) -> None:
+    scenario = load(folder, valid())
+    cold = scenario.points[0]
+    asked = study_identity(scenario.given({cold.temperature_degC: {"motor.gain": 4.0}}))
+    assert changed(study_identity(scenario), asked) == [f"start values[{cold.label}].motor.gain"]
+    assert asked[f"start values[{cold.label}].motor.gain"] == 4.0
+
+
+def test_the_lead_in_counts(folder: Path) -> None:
+    recording = load(folder, valid()).fit[0]
+    digests = {digest_of_recording(replace(recording, lead_in=t)) for t in (0.0, 0.1, 0.2)}
+    assert len(digests) == 3
+
+
+def test_stages_are_asked_in_their_order_and_with_one_version(folder: Path) -> None:
+    for name in ("one", "two"):
+        (folder / f"{name}.toml").write_text(toml(valid()))
+    stages = folder / "stages.toml"
+
+    def asked(*names: str) -> dict[str, Any]:
+        stages.write_text(toml({"kind": "identify", "stages": [{"scenario": f"{n}.toml"} for n in names]}))
+        return stages_identity(load_any(stages))  # type: ignore[arg-type]
+
+    before = asked("one", "two")
+    assert before["kind"] == "identify in stages"
+    assert before["stages (order)"] == ["one", "two"]
+    assert before["stages[one].seed"] == before["stages[two].seed"]
+    assert [key for key in before if "versions." in key and not key.startswith("versions.")] == []
+    assert before["versions.thsa-cosim"] == __version__
+    assert changed(before, asked("two", "one")) == ["stages (order)"]
+
+
+def test_a_package_that_is_not_installed_leaves_the_others_counting(monkeypatch: pytest.MonkeyPatch) -> None:
+    def installed(name: str) -> str:
+        if name == "fmpy":
+            raise PackageNotFoundError(name)
+        return f"{name} 1"
+
+    monkeypatch.setattr(identity, "version", installed)
+    assert identity._versions() == {
+        "versions.thsa-cosim": __version__,
+        "versions.numpy": "numpy 1",
+        "versions.scipy": "scipy 1",
+    }
+
+
+def test_members_without_a_name_are_counted_from_one() -> None:
+    class Edge(Table):
+        at: float
+
+    class Path_(Table):
+        edges: list[Edge]
+
+    asked = flatten(Path_(edges=[Edge(at=1.0), Edge(at=2.0)]))
+    assert asked == {"edges[1].at": 1.0, "edges[2].at": 2.0, "edges (order)": ["1", "2"]}
+    assert flatten(Path_(edges=[Edge(at=1.0)])) == {"edges[1].at": 1.0}
+
+
+def test_what_tables_are_made_of_becomes_plain() -> None:
+    @dataclass
+    class Pair:
+        first: Any
+        second: Any
+
+    found = _plain(Pair(np.array([1.0, 2.0]), {1: (Path("a") / "b", None)}))
+    assert found == {"first": [1.0, 2.0], "second": {"1": [str(Path("a") / "b"), None]}}
+    assert _plain([Pair, "text"]) == [Pair, "text"]
+
+
+def test_names_contents_and_borders_of_files_count_and_line_ends_do_not(tmp_path: Path) -> None:
+    def of(**files: bytes) -> str:
+        folder = tmp_path / f"{len(list(tmp_path.iterdir()))}"
+        for name, content in files.items():
+            path = folder / name.replace("__", "/").replace("_", ".")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+        return digest_of_folder(folder, ["*.mo", "package.order"])
+
+    assert of(a_mo=b"x\r\ny", sub__b_mo=b"z") == of(sub__b_mo=b"z", a_mo=b"x\ny")
+    assert of(a_mo=b"x\ny") != of(a_mo=b"xy") != of(a_mo=b"x\n\ny")
+    different = [
+        of(),
+        of(a_mo=b"x"),
+        of(b_mo=b"x"),
+        of(sub__a_mo=b"x"),
+        of(a_mo=b"x", b_mo=b""),
+        of(a_mo=b"xb.mo"),
+    ]
+    assert len(set(different)) == len(different)
+    assert of(a_mo=b"x", other_txt=b"no") == of(a_mo=b"x")
+    assert digest_of_folder(tmp_path / "not there", ["*"]) == of()

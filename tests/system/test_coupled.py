@@ -42,6 +42,7 @@ def run(
     inputs: Signals | None = None,
     connectors: Mapping[str, Sequence[str]] | None = None,
     tolerance: float = 1e-9,
+    time: FloatArray = TIME,
 ) -> Signals:
     system, archives = assemble("ring", parts, wires, connectors or {})
     path = write_ssp(system, archives, folder / "ring.ssp", DefaultExperiment(0.0, 1.0))
@@ -49,7 +50,7 @@ def run(
     try:
         unpack(path, scratch.path / "system")
         with open_plant(read_description(path), scratch.path / "system") as plant:
-            return plant.run(values, inputs, outputs, TIME, tolerance=tolerance)
+            return plant.run(values, inputs, outputs, time, tolerance=tolerance)
     finally:
         scratch.remove()
 
@@ -191,3 +192,36 @@ def test_units_of_a_connection_are_converted_once(tmp_path: Path) -> None:
     assert np.max(np.abs(found["a.feed"] - TIME)) < 1e-12
     assert np.max(np.abs(found["b.feed"] - (2.0 * TIME + 0.5))) < 1e-12
     assert np.max(np.abs(found["out"] - 1000.0 * (2.0 * TIME + 0.5))) < 1e-9
+
+
+def test_a_disturbance_is_added_to_its_connection(tmp_path: Path, fmi2: Path, fmi3: Path) -> None:
+    """A constant 0.5 on the way to ``fast`` is what a larger offset of the connection is."""
+    wires = (RING[0], replace(RING[1], offset=0.5, disturbance="d"))
+    steady = Signals(np.array([0.0, 1.0]), {"d": np.full(2, 0.5)}, {"d": "1"})
+    for parts in (
+        [Part("fast", fmi2), Part("slow", fmi3)],
+        [Part("fast", fmi2), Part("slow", fmi3, "coupled", 1e-3)],
+    ):
+        found = run(tmp_path, parts, wires, ["slow.y"], inputs=steady)
+        assert np.max(np.abs(found["slow.y"] - ring(TIME)[:, 1])) < 1e-4
+
+
+def test_jitter_makes_ticks_late_and_is_the_same_in_every_run(tmp_path: Path, fmi2: Path, fmi3: Path) -> None:
+    """The plant's input steps at the ticks; with jitter none comes early, none later than it says."""
+    period, most = 0.05, 0.02
+    wires = [Wire("controller.feed", "plant.u"), Wire("plant.y", "controller.u", -1.0, 1.0)]
+
+    def response(jitter: float) -> FloatArray:
+        parts = [Part("plant", fmi2), Part("controller", fmi3, "sampled", period, jitter=jitter)]
+        return run(tmp_path, parts, wires, ["controller.feed"], values={"plant.tau": 0.2}, time=fine)[
+            "controller.feed"
+        ]
+
+    fine = np.linspace(0.0, 1.0, 2001)
+    found = response(most)
+    ticks = fine[1:][np.diff(found) != 0.0]
+    late = np.mod(ticks + 1e-9, period)
+    assert len(ticks) >= 18
+    assert late.max() <= most + 1e-3  # two rows of the grid
+    assert np.ptp(late) > 0.5 * most
+    assert np.array_equal(found, response(most))

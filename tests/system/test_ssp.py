@@ -1,6 +1,7 @@
 """SSP archives: written, read back, nested, and refused in one sentence."""
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -96,16 +97,32 @@ def test_a_nested_system_with_bindings_mapping_and_transformation_is_the_flat_on
     assert np.max(np.abs(found - ring(TIME)[:, 1])) < 1e-7
 
 
+def test_the_types_of_ssp_2_are_read(tmp_path: Path) -> None:
+    structure = NESTED.replace('version="1.0" name="nested"', 'version="2.0" name="nested"')
+    structure = structure.replace("<ssc:Real/>", "<ssc:Float64/>").replace("<ssv:Real", "<ssv:Float64")
+    found = simulated(archive(tmp_path / "two.ssp", structure), "shown", {"fast.tau": VALUES["fast.tau"]})
+    assert np.max(np.abs(found - ring(TIME)[:, 1])) < 1e-7
+
+
+def test_the_archive_says_which_interface_of_an_fmu_runs(tmp_path: Path) -> None:
+    structure = NESTED.replace('name="fast"', 'name="fast" implementation="CoSimulation"')
+    structure = structure.replace('name="slow" s', 'name="slow" implementation="ModelExchange" s')
+    system = read_description(archive(tmp_path / "asked.ssp", structure)).system  # type: ignore[attr-defined]
+    assert {c.name: c.execution for c in system.components} == {"fast": "coupled", "inner.slow": "continuous"}
+
+
 def test_a_written_system_is_read_back_and_written_the_same(tmp_path: Path) -> None:
-    parts = [Part("fast", build.lag2()), Part("slow", build.lag3(), "sampled", 0.01, 0.005, {"k": 3.0})]
-    system, archives = assemble("ring", parts, RING, {"y": ["slow.y"]})
+    slow = Part("slow", build.lag3(), "sampled", 0.01, 0.005, {"k": 3.0}, jitter=0.001)
+    wires = [RING[0], replace(RING[1], disturbance="d")]
+    system, archives = assemble("ring", [Part("fast", build.lag2()), slow], wires, {"y": ["slow.y"]})
     path = write_ssp(system, archives, tmp_path / "a.ssp", DefaultExperiment(0.0, 2.0))
     description = read_description(path)
     again = description.system  # type: ignore[attr-defined]
-    assert [(c.name, c.execution, c.step, c.delay, dict(c.start)) for c in again.components] == [
-        ("fast", "continuous", None, 0.0, {}),
-        ("slow", "sampled", 0.01, 0.005, {"k": 3.0}),
+    assert [(c.name, c.execution, c.step, c.delay, c.jitter, dict(c.start)) for c in again.components] == [
+        ("fast", "continuous", None, 0.0, 0.0, {}),
+        ("slow", "sampled", 0.01, 0.005, 0.001, {"k": 3.0}),
     ]
+    assert [c.disturbance for c in again.connections] == ["", "d"]
     assert set(again.connections) == set(system.connections)
     assert again.connectors == system.connectors
     assert description.default_experiment == DefaultExperiment(0.0, 2.0)
@@ -148,6 +165,12 @@ WRONG = [
     ('source="time constant"', 'source="tau"', "a parameter mapping names 'tau', which its values lack"),
     ('factor="1"', 'factor="one"', "a factor is 'one', which is no number"),
     ("</ssd:SystemStructureDescription>", "", "is no valid XML"),
+    ('name="fast"', 'name="fast" implementation="ScheduledExecution"', "asks for 'ScheduledExecution'"),
+    (
+        "<ssc:Real/></ssd:Connector></ssd:Connectors><ssd:Elements>",
+        '<ssc:Real/><ssc:Dimension size="3"/></ssd:Connector></ssd:Connectors><ssd:Elements>',
+        "connector 'shown' is an array",
+    ),
     ('Connection startConnector="u"', 'Connection startConnector="w"', "there is no connector 'w'"),
 ]
 

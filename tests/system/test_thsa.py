@@ -55,6 +55,34 @@ def test_model_exchange_is_the_whole_to_the_solver_s_tolerance(tmp_path: Path, w
     assert max(errors(tmp_path, whole, *parts).values()) < 1e-7
 
 
+@pytest.mark.parametrize("step", [1e-5, 1e-4, 2e-3])
+def test_model_exchange_is_the_whole_at_any_communication_step(tmp_path: Path, step: float) -> None:
+    """Through the start of a ramp, where the nut breaks away, at 10 µs to 2 ms."""
+    time = np.linspace(0.0, 0.08, round(0.08 / step) + 1)
+    inputs = Signals(
+        np.array([0.0, 0.02, 0.08]),
+        {"v_cmd": np.array([0.0, 0.0, 1.8e-3]), "F_load": np.full(3, 55e3), "T_amb": np.full(3, -30.0)},
+        RAMP.units,
+    )
+    with Plant.open(FMUS / "THSA.fmu", kind="model-exchange") as plant:
+        whole = plant.run({}, inputs, list(OUTPUTS), time, tolerance=1e-9)
+    parts = Part("controller", FMUS / "Controller.fmu"), Part("plant", FMUS / "Plant.fmu")
+    found = run(
+        tmp_path,
+        parts,
+        WIRES,
+        list(OUTPUTS.values()),
+        values={},
+        inputs=inputs,
+        connectors=CONNECTORS,
+        tolerance=1e-9,
+        time=time,
+    )
+    for name, own in OUTPUTS.items():
+        assert np.ptp(whole[name]) > 0.0
+        assert np.max(np.abs(found[own] - whole[name])) < 1e-6 * np.ptp(whole[name])
+
+
 def test_co_simulation_comes_nearer_by_four_when_its_step_is_halved(tmp_path: Path, whole: Signals) -> None:
     found = []
     for step in (1e-3, 5e-4):

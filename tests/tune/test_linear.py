@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from thsa_cosim.errors import FmuError
-from thsa_cosim.fmu import Plant, SimulationFailure
+from thsa_cosim.fmu import Plant, SimulationFailure, linear
+from thsa_cosim.fmu.failure import Status
 from thsa_cosim.fmu.linear import OpenLoop, open_loop, state_names
 from thsa_cosim.signals import Signals
 from thsa_cosim.tune.margins import FREQUENCIES, margins, margins_by_control, margins_of
@@ -128,3 +129,30 @@ def _with_gains(gains: list[str]) -> OpenLoop:
 def test_an_fmu_that_hides_its_states_cannot_be_linearised() -> None:
     with Plant.open(THSA) as plant, pytest.raises(FmuError, match="which variables its states are"):
         state_names(dataclasses.replace(plant.description, state_references=()))
+
+
+@pytest.mark.parametrize("load", [0.0, 55e3])
+def test_derivatives_of_the_fmu_and_differences_open_the_same_loop(
+    load: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    exact = opened(THSA, load)
+    with Plant.open(THSA) as plant:
+        monkeypatch.setattr(linear, "_refusing", {plant.description.sha256})
+    by_differences = opened(THSA, load)
+    assert by_differences.b is not exact.b
+    omega = np.logspace(-2, 4, 60)
+    assert by_differences.response(omega) == pytest.approx(exact.response(omega), rel=2e-5)
+    assert by_differences.a == pytest.approx(exact.a, rel=1e-5, abs=1e-6 * abs(exact.a).max())
+
+
+def test_an_fmu_that_refuses_is_linearised_by_differences(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(linear, "_refusing", set())
+    exact = opened(THSA, 55e3)
+
+    def refuse(*_: object) -> None:
+        raise SimulationFailure(Status.FMI_ERROR, "cannot be a known of a derivative")
+
+    monkeypatch.setattr(linear._Point, "sensitivities", refuse)
+    omega = np.logspace(-2, 4, 60)
+    assert opened(THSA, 55e3).response(omega) == pytest.approx(exact.response(omega), rel=2e-5)
+    assert len(linear._refusing) == 1

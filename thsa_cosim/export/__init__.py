@@ -10,10 +10,14 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from thsa_cosim.errors import MissingExtraError, ModelicaError, ParameterError, did_you_mean
-from thsa_cosim.export.flatten import list_models
+from thsa_cosim.export.flatten import flatten, list_models
 from thsa_cosim.shipped import modelica_package
+
+if TYPE_CHECKING:
+    from thsa_cosim.export.causal import CausalModel
 
 __all__ = ["export_fmu", "list_models"]
 
@@ -72,11 +76,9 @@ def export_fmu(
     except ImportError as error:
         raise MissingExtraError("Exporting a Modelica model", "export") from error
     from thsa_cosim.export.archive import write_fmu
-    from thsa_cosim.export.causal import make_causal
     from thsa_cosim.export.compile import PLATFORMS
-    from thsa_cosim.export.flatten import flatten
 
-    causal = make_causal(flatten(model, package, libraries))
+    causal = causal_model(model, package, libraries)
     if start_values:
         settable = {v.name for v in causal.variables if v.start is not None}
         for name in start_values:
@@ -104,3 +106,19 @@ def export_fmu(
     date = float(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
     write_fmu(causal, fmi, output, date=date, platforms=chosen)
     return output
+
+
+def causal_model(model: str, package: Path, libraries: Sequence[Path] = ()) -> "CausalModel":
+    """The equations of a class, solved; Boolean and Integer parameters are fixed where they shape the equations.
+
+    Raises ModelicaError as `export_fmu` does.
+    """
+    from thsa_cosim.export.causal import make_causal
+
+    try:
+        return make_causal(flatten(model, package, libraries))
+    except ModelicaError as error:
+        try:
+            return make_causal(flatten(model, package, libraries, folded=True))
+        except ModelicaError:
+            raise error from None

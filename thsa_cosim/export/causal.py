@@ -135,6 +135,9 @@ class _Builder:
             variable.structural and variable.variability == "parameter"
         ):
             symbols[name] = ca.SX(self._value(name))
+        elif variable.tunable:
+            symbols[name] = ca.SX.sym(name)
+            self.parameters.append(variable)
         elif variable.variability == "parameter" and variable.type != "Real":
             if isinstance(variable.binding, Term) and self._depends(variable.binding):
                 self.translator.inline[name] = variable.binding
@@ -143,10 +146,6 @@ class _Builder:
         elif variable.variability == "parameter":
             self._sort_parameter(variable)
         elif variable.causality == "input":
-            if variable.type != "Real":
-                raise ModelicaError(
-                    f"{variable.place}: {name} is a {variable.type} input; the exporter supports Real ones."
-                )
             symbols[name] = ca.SX.sym(name)
             self.inputs.append(variable)
         elif variable.variability == "discrete":
@@ -192,7 +191,7 @@ class _Builder:
             if variable is None or (
                 variable.variability == "parameter"
                 and not variable.structural
-                and (variable.type == "Real" or self._depends(variable.binding))
+                and (variable.type == "Real" or variable.tunable or self._depends(variable.binding))
             ):
                 return True
         return False

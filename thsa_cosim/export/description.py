@@ -200,7 +200,7 @@ def _attributes(model: CausalModel, variable: ModelVariable) -> tuple[dict[str, 
     }
     real: dict[str, str] = {}
     if variable.causality == "input":
-        attributes |= {"causality": "input", "variability": "continuous"}
+        attributes |= {"causality": "input", "variability": "discrete" if variable.discrete else "continuous"}
     elif variable.kind == "parameter":
         attributes |= {"causality": "parameter", "variability": "tunable", "initial": "exact"}
     elif variable.kind == "dependent":

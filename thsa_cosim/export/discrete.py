@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export.structure import match
 from thsa_cosim.modelica.flat import FlatEquation, FlatModel, FlatVariable
-from thsa_cosim.modelica.terms import Scalar, Term, make, walk
+from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, make, walk
 
 _BOOLEAN = frozenset(
     ("and", "or", "not", "<", "<=", ">", ">=", "==", "<>", "edge", "change", "initial", "sample")
@@ -101,7 +101,7 @@ def kind(value: Scalar, flat: FlatModel) -> str:
         if isinstance(value, bool):
             return "Boolean"
         if not isinstance(value, Term):
-            return "Integer" if isinstance(value, int) else "Real"
+            return "Integer" if isinstance(value, (int, Enumeration)) else "Real"
         op = value.op
         if op == "ref":
             variable = flat.variables.get(value.args[0])

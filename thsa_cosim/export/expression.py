@@ -234,7 +234,9 @@ class Translator:
         names = {str(symbol): name for name, symbol in self.symbols.items()}
         for symbol in ca.symvar(expression):
             name = names.get(str(symbol), str(symbol))
-            if str(symbol) in self.discrete or name not in self.symbols:
+            if str(symbol) in self.discrete or str(symbol) in self.memory.symbols():
+                continue
+            if name not in self.symbols and not name.startswith("der("):
                 continue
             rate = ca.SX(1) if name == "time" else self.derivatives(name)
             result += ca.jacobian(expression, symbol) * rate

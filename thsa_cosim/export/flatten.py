@@ -14,7 +14,7 @@ from thsa_cosim.modelica.syntax import ClassDefinition, Component, Extends
 __all__ = ["Experiment", "FlatEquation", "FlatModel", "FlatVariable", "flatten", "list_models", "locate"]
 
 
-def flatten(model: str, package: Path, libraries: Sequence[Path] = ()) -> FlatModel:
+def flatten(model: str, package: Path, libraries: Sequence[Path] = (), *, folded: bool = False) -> FlatModel:
     """Flatten a Modelica class.
 
     Parameters
@@ -26,6 +26,9 @@ def flatten(model: str, package: Path, libraries: Sequence[Path] = ()) -> FlatMo
         Folder of the Modelica package (it holds ``package.mo``) that the class belongs to or uses.
     libraries:
         Further packages, folders of packages or files; those of the environment variable MODELICAPATH follow.
+    folded:
+        Fix all Boolean and Integer parameters at export. Without it those of the class itself can be set in the FMU
+        where they do not shape its equations.
 
     Raises
     ------
@@ -33,7 +36,7 @@ def flatten(model: str, package: Path, libraries: Sequence[Path] = ()) -> FlatMo
         The class is not found, does not compile, or is outside the exportable subset.
     """
     library, _, name = _find(model, package, libraries)
-    return flatten_class(library, name)
+    return flatten_class(library, name, folded)
 
 
 def locate(model: str, package: Path, libraries: Sequence[Path] = ()) -> tuple[Path, str]:

@@ -43,6 +43,8 @@ def merge(description: SystemDescription, archives: Mapping[str, bytes], folder:
     system = description.system
     if any(stage.is_loop for stage in stages(system)):
         raise NotMergeable("it has an algebraic loop")
+    if any(connection.disturbance for connection in system.connections):
+        raise NotMergeable("a disturbance is added to a connection")
     runtime: dict[str, bytes] = {}
     members, documents, headers = [], [], []
     for component in system.components:

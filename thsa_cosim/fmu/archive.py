@@ -85,7 +85,12 @@ def unpack(path: Path, folder: Path) -> Path:
         check_archive(path, archive)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            archive.extractall(folder)
+            for entry in archive.infolist():
+                entry.filename = entry.filename.replace(
+                    "\\", "/"
+                )  # some tools on Windows write their separator
+                archive.extract(entry, folder)
+            (folder / "resources").mkdir(exist_ok=True)  # an FMU is told where it is, and may look
         except (
             zipfile.BadZipFile,
             zlib.error,

@@ -5,7 +5,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -170,7 +170,7 @@ def read_description(path: Path | str) -> FmuDescription:
         # fmpy gets an open file, as it does not close what it opens when it raises.
         with path.open("rb") as file:
             raw = read_model_description(file, validate=False)
-            platforms = tuple(sorted(fmpy.supported_platforms(file)))
+            platforms = tuple(sorted({*fmpy.supported_platforms(file), *_windows_paths(file)}))
     except Exception as error:
         message = " ".join(str(error).split()) or type(error).__name__
         raise FmuError(f"{path}: modelDescription.xml cannot be read ({message.rstrip('.')}).") from None
@@ -214,6 +214,13 @@ def read_description(path: Path | str) -> FmuDescription:
             for unknown in raw.outputs
         },
     )
+
+
+def _windows_paths(file: IO[bytes]) -> set[str]:
+    """Platforms of an archive whose entries have backslashes, as some tools on Windows write them."""
+    with zipfile.ZipFile(file) as archive:
+        parts = [name.split("\\") for name in archive.namelist() if "\\" in name]
+    return {p[1] for p in parts if len(p) == 3 and p[0] == "binaries" and p[2]}
 
 
 def _state_references(raw: Any) -> tuple[tuple[int, int], ...]:

@@ -20,7 +20,9 @@ _Logger = ctypes.CFUNCTYPE(
 )
 
 
-class _Callbacks(ctypes.Structure):
+class Callbacks(ctypes.Structure):
+    """fmi2CallbackFunctions."""
+
     _fields_: ClassVar = [
         ("logger", _Logger),
         ("allocate_memory", ctypes.c_void_p),
@@ -54,8 +56,8 @@ class Fmi2Instance(Instance):
 
     def instantiate(self) -> None:
         """Call fmi2Instantiate."""
-        callbacks = _shared_callbacks()
-        _listener[0] = self.messages
+        callbacks = shared_callbacks()
+        listen(self.messages)
         function = self.library.function(
             "fmi2Instantiate",
             ctypes.c_char_p,
@@ -164,13 +166,18 @@ def _log(_env: int, _name: bytes, status: int, category: bytes, message: bytes) 
         _listener[0].add(status, category, message)
 
 
+def listen(messages: Messages) -> None:
+    """Let ``messages`` hear what is logged from now on."""
+    _listener[0] = messages
+
+
 @cache
-def _shared_callbacks() -> _Callbacks:
+def shared_callbacks() -> Callbacks:
     """Callbacks of every instance; they live as long as the process, as late messages may come."""
     libc = ctypes.CDLL("msvcrt") if hasattr(ctypes, "WinDLL") else ctypes.CDLL(None)
     # The C library's own functions: no Python runs in an FMU's allocations.
     allocate, free = (ctypes.cast(f, ctypes.c_void_p).value for f in (libc.calloc, libc.free))
-    callbacks = _Callbacks(_Logger(_log), allocate, free, None, None)
+    callbacks = Callbacks(_Logger(_log), allocate, free, None, None)
     # Python cannot read printf arguments; fmpy's C helper formats before our logger is called. It is loaded
     # without importing fmpy, which would cost every worker a tenth of a second.
     package = importlib.util.find_spec("fmpy")

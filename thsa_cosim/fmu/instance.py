@@ -1,4 +1,4 @@
-"""What FMI 2.0 and FMI 3.0 instances have in common, seen from the stepping loop and the integrator."""
+"""What instances (FMI 2.0, 3.0, and 1.0 Model Exchange) have in common, seen from stepping loop and integrator."""
 
 import ctypes
 from abc import ABC, abstractmethod
@@ -62,7 +62,7 @@ class Channel:
 class Instance(ABC):
     """One live instance; every failing call raises SimulationFailure."""
 
-    prefix: ClassVar[str]
+    prefix: str
     types: ClassVar[dict[str, tuple[str, Any]]]
     """FMI data type -> (function suffix, numpy type)"""
 

@@ -80,6 +80,8 @@ def state_names(description: FmuDescription) -> tuple[str, ...]:
     return names
 
 
+_refusing: set[str] = set()
+"""Digests of FMUs that do not give every derivative themselves: an instance that refused a call is not used again."""
 _last_names: list[tuple[FmuDescription, tuple[str, ...]]] = []
 
 
@@ -115,6 +117,16 @@ def open_loop(
         If the FMU does not name its states.
     """
     names = state_names(description)
+    if description.sha256 not in _refusing:
+        with _Point(description, folder, values, inputs, time, states, signal) as point:
+            try:
+                exact = _exact(point, states, gains, values)
+            except SimulationFailure:
+                _refusing.add(description.sha256)
+                exact = None
+        if exact is not None:
+            a, b, c = exact
+            return OpenLoop(names, a - np.outer(b, c), b, c, "directional")
     with _Point(description, folder, values, inputs, time, states, signal) as point:
         size = np.maximum(np.abs(states), point.nominal())
         steps = _STEP * size
@@ -157,6 +169,37 @@ def open_loop(
     return OpenLoop(names, jacobian[:-1] - np.outer(b, c), b, c, kind)
 
 
+def _exact(
+    point: "_Point", states: FloatArray, gains: Sequence[str], values: Mapping[str, float]
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """∂f/∂x (n, n), b (n,) and ∂s/∂x (n,) as the FMU gives them; None if it gives none, or no gain moves the signal.
+
+    FMI 2.0.4 promises derivatives of state derivatives and outputs with respect to states and inputs. Our exporter's
+    FMUs give them of every signal, and with respect to parameters too, as FMI 3.0 does for tunable ones.
+    SimulationFailure from one that does not.
+    """
+    if not point.description.capabilities.get("providesDirectionalDerivative"):
+        return None
+    jacobian = point.sensitivities([k for k, _ in point.description.state_references], states)
+    size = np.maximum(np.abs(states), point.nominal())
+    # At the working point a controller that feeds forward perfectly has no error: then the states are moved.
+    moved = states + 1e-3 * size
+    for place in (states, moved):
+        enough = _ENOUGH * max(1.0, abs(float(point.evaluate(place)[-1])))
+        best = np.zeros(len(states) + 1)
+        for name in gains:
+            column = point.sensitivities([point.description.variable(name).value_reference], place)
+            if not np.isfinite(column).all():
+                continue
+            change = column[:, 0] * _GAIN_STEP * (abs(values[name]) or 1.0)
+            best = max(best, change, key=lambda f: abs(float(f[-1])))
+            if abs(best[-1]) > enough:
+                break
+        if abs(best[-1]) > 1e-3 * enough:
+            return jacobian[:-1], best[:-1] / best[-1], jacobian[-1]
+    return None
+
+
 class _Point:
     """One Model Exchange instance held at a time; gives (dx/dt, s) for states of our choice."""
 
@@ -175,7 +218,7 @@ class _Point:
         self._derivatives = (
             "GetDerivatives" if description.fmi_version == "2.0" else "GetContinuousStateDerivatives"
         )
-        self._description = description
+        self.description = description
         self._signal: list[Channel] = []
         try:
             self._begin(values, inputs, time, states, signal)
@@ -191,7 +234,7 @@ class _Point:
         states: FloatArray,
         signal: str,
     ) -> None:
-        instance, description = self._instance, self._description
+        instance, description = self._instance, self.description
         instance.instantiate()
         _set(instance, values)
         instance.initialize_begin(0.0, max(time, 1.0), None)
@@ -224,22 +267,33 @@ class _Point:
 
     def nominal(self) -> FloatArray:
         """Return the states' nominal values (n,), 1 where they are of no use."""
-        nominal = np.ones(self._description.states)
+        nominal = np.ones(self.description.states)
         self._instance.vector("GetNominalsOfContinuousStates", nominal)
         usable = np.isfinite(nominal) & (nominal != 0.0)
         return np.where(usable, np.abs(nominal), 1.0)
 
     def directional(self, states: FloatArray, jacobian: FloatArray) -> str:
         """Replace ∂f/∂x in ``jacobian`` (n + 1, n) by the FMU's own where it gives it; say which it is."""
-        if not self._description.capabilities.get("providesDirectionalDerivative"):
+        if not self.description.capabilities.get("providesDirectionalDerivative"):
             return "differences"
         self._instance.vector("SetContinuousStates", np.ascontiguousarray(states))
-        references = np.array(self._description.state_references, dtype=np.uint32)
+        references = np.array(self.description.state_references, dtype=np.uint32)
         column = np.empty(len(states))
         for j in range(len(states)):
             self._instance.directional_derivative(references[:, 1], references[j : j + 1, 0], column)
             jacobian[:-1, j] = column
         return "directional"
+
+    def sensitivities(self, knowns: Sequence[int], states: FloatArray) -> FloatArray:
+        """∂(dx/dt, signal)/∂knowns (n + 1, m) at ``states`` by the FMU itself."""
+        self._instance.vector("SetContinuousStates", np.ascontiguousarray(states))
+        rows = [derivative for _, derivative in self.description.state_references]
+        unknowns = np.array([*rows, *self._signal[0].references], dtype=np.uint32)
+        found, column = np.empty((len(unknowns), len(knowns))), np.empty(len(unknowns))
+        for j, known in enumerate(np.array(knowns, dtype=np.uint32)[:, None]):
+            self._instance.directional_derivative(unknowns, known, column)
+            found[:, j] = column
+        return found
 
     def __enter__(self) -> Self:
         return self

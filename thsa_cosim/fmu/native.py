@@ -1,5 +1,6 @@
 """An FMU's shared library: loading, calling, and the callbacks that it is given."""
 
+import contextlib
 import ctypes
 import os
 import sys
@@ -54,7 +55,7 @@ class Library:
 
     def __init__(self, path: Path) -> None:
         try:
-            self._dll = ctypes.CDLL(str(path))
+            self._dll = _loaded_with_neighbours(path)
         except OSError as error:
             raise SimulationFailure(Status.LOAD_ERROR, f"{path.name} cannot be loaded: {error}") from None
         self._name = path.name
@@ -82,6 +83,20 @@ class Library:
     def address(function: Any) -> int:
         """Return a function's (or callback's) address as an integer."""
         return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+
+def _loaded_with_neighbours(path: Path) -> ctypes.CDLL:
+    """Load a library; if one that it needs is not found, load those beside it in the archive first."""
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError:
+        beside = [p for p in sorted(path.parent.iterdir()) if p != path and LIBRARY_SUFFIX in p.name]
+        for _ in beside:  # they may need each other: a round settles one at least
+            for library in list(beside):
+                with contextlib.suppress(OSError):
+                    ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
+                    beside.remove(library)
+        return ctypes.CDLL(str(path))
 
 
 _loaded: dict[Path, Library] = {}

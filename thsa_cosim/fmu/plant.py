@@ -12,8 +12,10 @@ import numpy as np
 from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.description import FmuDescription, read_description
+from thsa_cosim.fmu.fmi1_exchange import Fmi1Exchange
 from thsa_cosim.fmu.fmi2 import Fmi2Instance
 from thsa_cosim.fmu.fmi3 import Fmi3Instance
+from thsa_cosim.fmu.inputs import communication_grid
 from thsa_cosim.fmu.instance import Instance, Phase
 from thsa_cosim.fmu.intermediate import IntermediateUpdate
 from thsa_cosim.fmu.native import MessageSink
@@ -28,6 +30,7 @@ Backend = Literal["compiled", "python"]
 Reuse = Literal["fresh", "reset"]
 Stepping = Literal["free", "samples"]
 
+VARIABLE_STEP = "canHandleVariableCommunicationStepSize"
 _PLANS = 64
 _log = logging.getLogger(__name__)
 
@@ -69,10 +72,6 @@ class Plant:
         if not supported[self.kind]:
             other = next(k for k, yes in supported.items() if yes)
             raise FmuError(f"{description.path} does not support {self.kind}; open it with kind={other!r}.")
-        if description.fmi_version == "1.0" and self.kind == "model-exchange":
-            raise FmuError(
-                f"{description.path} is FMI 1.0 Model Exchange, which is not supported; export FMI 2.0."
-            )
         self._backend = backend
         self.reuse: Reuse = reuse
         self.stepping: Stepping = stepping
@@ -161,7 +160,8 @@ class Plant:
             Names of the variables to record; any causality.
         time
             (n,) s, strictly increasing: communication points and output times. ``time[0]`` is the start;
-            the first values are those after initialisation with the inputs at ``time[0]``.
+            the first values are those after initialisation with the inputs at ``time[0]``. A Co-Simulation FMU that
+            takes steps of one size only communicates at even points, and outputs are interpolated between them.
         tolerance
             Relative tolerance for the FMU's solver (or, in Model Exchange, ours); ``None``: its default.
         once
@@ -179,20 +179,42 @@ class Plant:
         ParameterError, FmuError
             If a name is unknown or cannot be set or driven.
         """
-        if self.description.fmi_version == "1.0":
+        if self.description.fmi_version == "1.0" and self.kind == "co-simulation":
             from thsa_cosim.fmu.fmi1 import run_fmi1
 
             mode = self.input_mode or "mean"
             return run_fmi1(self.folder, self.description, values, inputs, outputs, time, self.progress, mode)
+        points = self._points(time)
         try:
-            result = self._run(values, inputs, outputs, time, tolerance, once)
+            result = self._run(values, inputs, outputs, points, tolerance, once)
         except BaseException:
             self._free()
             raise
+        if points is not time:
+            result = result.resample(time)
         if self.reuse == "fresh":
             self._free()
         self.progress[0] = Phase.IDLE
         return result
+
+    def _points(self, time: FloatArray) -> FloatArray:
+        """Communication points for output times (n,) s: even ones for an FMU that takes steps of one size only."""
+        description = self.description
+        if self.kind == "model-exchange" or description.capabilities.get(VARIABLE_STEP, False):
+            return time
+        if len(time) < 3 or np.ptp(communication_grid(time).steps) == 0.0:
+            return time
+
+        def even() -> FloatArray:
+            step = float(np.median(np.diff(time)))
+            preferred = description.default_experiment.step
+            if preferred is not None and 0.0 < preferred <= 1.5 * step:
+                step = preferred
+            count = int(np.ceil((time[-1] - time[0]) / step * (1.0 - 1e-9)))
+            return np.asarray(time[0] + step * np.arange(count + 1))
+
+        points: FloatArray = self._cached(("points", id(time)), even, keep=time)
+        return points
 
     def _run(
         self,
@@ -259,7 +281,8 @@ class Plant:
             _ = self.backend
 
     def _new_instance(self) -> Instance:
-        cls = Fmi2Instance if self.description.fmi_version == "2.0" else Fmi3Instance
+        version = self.description.fmi_version
+        cls = Fmi2Instance if version == "2.0" else Fmi3Instance if version == "3.0" else Fmi1Exchange
         return cls(self.folder, self.description, self.kind, self._on_message)
 
     def _settable(self, instance: Instance, names: Sequence[str]) -> Any:

@@ -31,7 +31,7 @@ class InstancePoint:
         self._instance = instance
         n = instance.description.states
         pointer, function, prefix = ctypes.c_void_p, instance.library.function, instance.prefix
-        self._derivatives = "GetDerivatives" if prefix == "fmi2" else "GetContinuousStateDerivatives"
+        self._derivatives = "GetContinuousStateDerivatives" if prefix == "fmi3" else "GetDerivatives"
         self._x, self._dx = np.zeros(n), np.zeros(n)
         self._x_address, self._dx_address = self._x.ctypes.data, self._dx.ctypes.data
         self._set_time = function(f"{prefix}SetTime", pointer, ctypes.c_double)

@@ -257,7 +257,11 @@ class _Search:
     def _slips(self) -> list[Finding]:
         """What one slip of one signal would explain of what the fit leaves, beyond what is known of the data."""
         known = {(f.recording, f.channel, f.kind) for f in self._scenario.data.findings}
-        found = [f for k in sorted(self._found) for f in misfits(self._point_residuals(k))]
+        found = [
+            f
+            for k in sorted(self._found)
+            for f in misfits(self._point_residuals(k), self._scenario.file_units)
+        ]
         return [f for f in found if (f.recording, f.channel, f.kind) not in known]
 
     def _bounds(self) -> list[str]:

@@ -54,7 +54,7 @@ def across_findings(channels: Sequence[Channel]) -> Iterator[Finding]:
         for channel in measured:
             if _one_dimension(command, channel):
                 for finding in _slip(command, channel):
-                    named.add(channel.name)
+                    named |= {channel.name, command.name}
                     yield finding
     for position in channels:
         for speed in channels:
@@ -149,7 +149,7 @@ def _slip(command: Channel, channel: Channel) -> Iterator[Finding]:
     factor = _ratio(a, b)
     if factor is None:
         return
-    yield from _named(channel, factor, f"its command {command.name}")
+    yield from _named(channel, factor, f"its command {command.name}", command)
 
 
 def _ratio(a: FloatArray, b: FloatArray) -> float | None:
@@ -165,18 +165,28 @@ def _ratio(a: FloatArray, b: FloatArray) -> float | None:
     return float(middle) if high - low < 0.2 * abs(middle) else None
 
 
-def _named(channel: Channel, factor: float, other: str) -> Iterator[Finding]:
+def _named(channel: Channel, factor: float, words: str, other: Channel) -> Iterator[Finding]:
+    """A slip of ``channel`` against ``other``, in ``words``: which of the two is wrong, they do not tell."""
     sign = factor < 0.0
     name = slip(abs(factor))
     if name in _GEARS and same_dimension(channel.unit, "rad/s"):
         name = None
+    turn = -1.0 if sign else 1.0
     if name is not None:
-        text = f"{channel.name} is {abs(factor):.4g} times {other}: {name}"
-        remedy = f"[recordings.columns.{channel.name}]\nscale = {(-1.0 if sign else 1.0) / SLIPS[name]:.9g}"
+        back = slip(1.0 / abs(factor)) or name
+        text = f"{channel.name} is {abs(factor):.4g} times {words}: {name}, unless {other.name} is wrong"
+        remedy = f"[recordings.columns.{channel.name}]\nscale = {turn / SLIPS[name]:.9g}"
         yield channel.finding("unit", "error", text, (), remedy)
+        text = (
+            f"{words} is {1.0 / abs(factor):.4g} times {channel.name}: {back}, unless {channel.name} is wrong"
+        )
+        remedy = f"[recordings.columns.{other.name}]\nscale = {turn * SLIPS[name]:.9g}"
+        yield other.finding("unit", "error", text, (), remedy)
     if sign:
-        text = f"{channel.name} runs against {other}"
-        yield channel.finding("sign", "error", text, (), f"[recordings.columns.{channel.name}]\nscale = -1")
+        for one, against in ((channel, words), (other, channel.name)):
+            text = f"{one.name} runs against {against}: one of the two has the wrong sign"
+            remedy = f"[recordings.columns.{one.name}]\nscale = -1"
+            yield one.finding("sign", "error", text, (), remedy)
 
 
 def _is_derivative(position: Channel, speed: Channel) -> bool:
@@ -216,7 +226,7 @@ def _derivative(position: Channel, speed: Channel) -> Iterator[Finding]:
     ratio = float(np.sum(a * b)) / float(np.sum(b * b))
     if abs(ratio - 1.0) < _SAME_SPEED:
         return
-    yield from _named(speed, ratio, f"the derivative of {position.name}")
+    yield from _named(speed, ratio, f"the derivative of {position.name}", position)
 
 
 _SAME_SPEED = 0.05

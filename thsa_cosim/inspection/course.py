@@ -3,11 +3,14 @@
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.stats import spearmanr
 
 from thsa_cosim.errors import UnitError
 from thsa_cosim.inspection.channel import Channel
 from thsa_cosim.inspection.finding import Finding, Severity
+from thsa_cosim.recordings.independence import lattice_step
 from thsa_cosim.recordings.noise import white_noise
+from thsa_cosim.recordings.outliers import running_median
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import convert, same_dimension
 
@@ -18,6 +21,10 @@ _LEAST_SHARE = 1e-5
 """Noise in shares of the range, below which there is no sensor's."""
 _UNEQUAL = 1.7
 """Ratio of the noise in one stretch to that in the others."""
+_GROWING, _MONOTONE = 2.0, 0.9
+"""Ratio of the noise at the end to that at the beginning, and rank correlation with time, of noise that grows."""
+_WHITE = 1.5
+"""Noise of every second sample in shares of the noise of all, from which on it is motion."""
 _MOVING = 8.0
 """σ off rest."""
 
@@ -34,8 +41,14 @@ def unequal_noise(channel: Channel) -> Iterator[Finding]:
     floor = max(channel.quantum / np.sqrt(12.0), 1e-3 * channel.noise)
     least = max(0.4 * channel.quantum, _LEAST_SHARE * channel.range)
     levels = np.array([max(white_noise(values[part]), floor) for part in parts])
+    if levels.min() < least:
+        return
     block = _other_block(levels)
-    if block is None or levels.min() < least:
+    if block is None:
+        half = [max(white_noise(values[part][::2]), floor) for part in parts]
+        white = np.quantile(np.array(half) / levels, 0.8) < _WHITE  # what bends with the motion is no noise
+        if white and levels.min() > lattice_step(channel.plain):
+            yield from _trend(channel, levels)
         return
     first, last = index[parts[block[0]][0]], index[parts[block[1] - 1][-1]]
     inside = float(np.median(levels[slice(*block)]))
@@ -46,6 +59,20 @@ def unequal_noise(channel: Channel) -> Iterator[Finding]:
     )
     where = ((float(channel.time[first]), float(channel.time[last])),)
     yield channel.finding("unequal-noise", "warning", text, where)
+
+
+def _trend(channel: Channel, levels: FloatArray) -> Iterator[Finding]:
+    """Noise that grows (or falls) from the first window to the last of (m,) ``levels``, whatever the signal does."""
+    course = running_median(np.log(levels), 5)
+    change = float(course[-1] - course[0])
+    order = spearmanr(np.arange(levels.size), levels).statistic
+    if abs(change) < np.log(_GROWING) or abs(order) < _MONOTONE:
+        return
+    text = (
+        f"the noise of {channel.name} {'grows' if change > 0.0 else 'falls'} over the recording, from"
+        f" {channel.number(float(np.exp(course[0])))} to {channel.number(float(np.exp(course[-1])))}"
+    )
+    yield channel.finding("unequal-noise", "warning", text)
 
 
 def _other_block(levels: FloatArray) -> tuple[int, int] | None:

@@ -6,16 +6,18 @@ parameter is therefore no slip, nor what such a value hides. The slip that expla
 tested again. A model that lacks something leaves structure that no slip explains: it has no finding.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thsa_cosim.errors import UnitError
 from thsa_cosim.inspection.across import SLIPS, slip
 from thsa_cosim.inspection.finding import Finding, Severity
 from thsa_cosim.inspection.trust import Residual
 from thsa_cosim.recordings import noise_estimate
 from thsa_cosim.signals import FloatArray
+from thsa_cosim.units import conversion
 
 _SURE = 60.0
 """Drop of the sum of squares, in noise variances, below which nothing is said (z of 7.7)."""
@@ -144,6 +146,12 @@ class _Rest:
         self._basis = np.column_stack((self._basis, free))
 
     @property
+    def chance(self) -> float:
+        """By how much the sum of squares of white noise may be larger than expected: three standard deviations."""
+        counts = (f * f * r.values.size for f, r in zip(self.floors, self.own, strict=True))
+        return 3.0 * float(np.sqrt(2.0 * sum(counts)))
+
+    @property
     def excess(self) -> float:
         """What is left beyond white noise, as a sum of squares over this recording."""
         parts = (float(self.values[s] @ self.values[s]) for s in self.rows)
@@ -151,10 +159,13 @@ class _Rest:
         return max(sum(parts) - sum(counts), 0.0)
 
 
-def misfits(residuals: Sequence[Residual]) -> list[Finding]:
+def misfits(
+    residuals: Sequence[Residual], file_units: Mapping[str, str | None] | None = None
+) -> list[Finding]:
     """Return findings on what the fit of one set of parameters leaves; residuals without ``simulated`` tell nothing.
 
-    The columns of the residuals' ``slopes`` are the same parameters throughout.
+    The columns of the residuals' ``slopes`` are the same parameters throughout. ``file_units``: of the channels'
+    columns in the file, in which remedies are given; None: by the file itself.
     """
     if not residuals or any(r.simulated.size != r.values.size or not _usable(r) for r in residuals):
         return []
@@ -165,7 +176,7 @@ def misfits(residuals: Sequence[Residual]) -> list[Finding]:
     first = 0
     for name in dict.fromkeys(r.recording for r in residuals):
         own = [r for r in residuals if r.recording == name]
-        found += _recording(_Rest(own, stacked, slopes, basis, first))
+        found += _recording(_Rest(own, stacked, slopes, basis, first), file_units or {})
         first += sum(r.values.size for r in own)
     return found
 
@@ -186,10 +197,10 @@ def _orthonormal(slopes: FloatArray) -> FloatArray:
 
 def _floor(values: FloatArray) -> float:
     """Variance of the white part of a residual; no more than all of it."""
-    return min(noise_estimate(values) ** 2, float(np.mean(values**2)))
+    return min(noise_estimate(values, smooth=False) ** 2, float(np.mean(values**2)))
 
 
-def _recording(rest: _Rest) -> Iterator[Finding]:
+def _recording(rest: _Rest, file_units: Mapping[str, str | None]) -> Iterator[Finding]:
     against = [f for r in rest.own if (f := _against(r)) is not None]
     if against:
         yield from against  # of a fit to the wrong sign nothing else is told
@@ -203,10 +214,11 @@ def _recording(rest: _Rest) -> Iterator[Finding]:
             return
         floor = max(rest.floors)
         least = _UNIT_SHARE if best.kind in ("gain", "common-delay") else _SHARE
-        if best.gain < _SURE * floor or best.gain < least * excess:
+        if best.gain < _SURE * floor or best.gain < least * (excess - rest.chance):
             return
-        share = best.gain / excess
-        finding = _finding(rest, _settled_delay(rest, best) if best.kind.endswith("delay") else best, share)
+        share = min(best.gain / excess, 1.0)
+        settled = _settled_delay(rest, best) if best.kind.endswith("delay") else best
+        finding = _finding(rest, settled, share, file_units)
         if finding is None:
             return
         yield finding
@@ -312,7 +324,7 @@ def _common_delay(rest: _Rest) -> Iterator[_Slip]:
             yield _Slip("common-delay", found.channel, found.column, found.size, found.gain)
 
 
-def _finding(rest: _Rest, best: _Slip, share: float) -> Finding | None:
+def _finding(rest: _Rest, best: _Slip, share: float, file_units: Mapping[str, str | None]) -> Finding | None:
     """``best`` in words; None if it is too small, or no slip after all."""
     if best.kind == "common-delay":
         return _delay_finding(rest.own[0], best, -best.size, share)
@@ -341,8 +353,19 @@ def _finding(rest: _Rest, best: _Slip, share: float) -> Finding | None:
         where = ((best.at, float(residual.time[-1])),)
         return Finding(residual.recording, name, "step", "warning", text, where)
     text = f"{what} all the time, {explained}: an offset of its sensor, or a constant that the model lacks"
-    remedy = f"{table}\noffset = {-best.size:.4g}  # in {unit}, the unit of the FMU's variable"
+    remedy = f"{table}\noffset = {_in_file(-best.size, unit, file_units.get(name))}"
     return Finding(residual.recording, name, "offset", "warning", text, (), remedy)
+
+
+def _in_file(offset: float, unit: str, file_unit: str | None) -> str:
+    """An offset as a scenario wants it: in the file's unit."""
+    try:
+        own = offset * conversion(unit, file_unit)[0] if file_unit else None
+    except UnitError:
+        own = None
+    if own is None:
+        return f"{offset:.4g}  # in {unit}; write it in the unit of the file's numbers"
+    return f"{own:.4g}  # in {file_unit}, the unit of the file's numbers"
 
 
 def _delay_finding(residual: Residual, best: _Slip, by: float, share: float) -> Finding | None:

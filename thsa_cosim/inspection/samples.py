@@ -6,17 +6,28 @@ import numpy as np
 
 from thsa_cosim.inspection.channel import Channel, share
 from thsa_cosim.inspection.finding import Finding, Severity
+from thsa_cosim.recordings.independence import lattice_step
+from thsa_cosim.recordings.noise import RESTING, white_noise
+from thsa_cosim.signals import FloatArray
 
 _DITHERED = 0.7
 """Noise in steps from which on averages see between the levels."""
+_WINDOW, _MORE, _PART = 64, 0.3, 0.15
+"""Samples of a window; share of repeated values beyond chance, and share of such windows, that are no chance."""
+_BURSTS, _LEAST = 5, 4
+_ABOVE = 2.0
+"""Quantisation steps of noise from which on a value that repeats is no chance."""
 _LEVELS = 100
 """A signal that is met by fewer levels than this over its range is coarse, if no noise dithers them."""
 
 
 def dependent_samples(channel: Channel) -> Iterator[Finding]:
-    """Held or interpolated samples: a slow channel in a fast table."""
+    """Held, interpolated or smoothed samples: a slow channel in a fast table."""
     found = channel.independence
-    if found.kind is None or channel.averaged:
+    if channel.averaged:
+        return
+    if found.kind is None:
+        yield from _partly_held(channel)
         return
     table, own = 1.0 / channel.step, 1.0 / (channel.step * found.period)
     rates = f"{own:.4g} Hz in a {table:.4g} Hz table"
@@ -26,11 +37,74 @@ def dependent_samples(channel: Channel) -> Iterator[Finding]:
     if found.kind == "held":
         text = f"{channel.name} repeats each value {found.period:.3g} times: {rates}"
         yield channel.finding("held-samples", severity, text, (), remedy)
+    elif found.kind == "smooth":
+        text = (
+            f"neighbouring samples of {channel.name} depend on each other over some {found.period:.3g} samples: it"
+            f" was upsampled from a lower rate, or filtered"
+        )
+        # What drives a model may well be smooth, and need not be compared.
+        yield channel.finding(
+            "interpolated-samples", severity if channel.role == "output" else "note", text, (), remedy
+        )
     else:
         text = (
             f"{channel.name} runs straight over {found.period:.3g} samples at a time: {rates}, interpolated"
         )
         yield channel.finding("interpolated-samples", severity, text, (), remedy)
+
+
+def _partly_held(channel: Channel) -> Iterator[Finding]:
+    """Values that repeat more often than noise and resolution make them: in a part, at no fixed rate, in bursts."""
+    if channel.role == "input" and (channel.held or not channel.steady):
+        return  # a command stays where it is told to
+    same = np.diff(channel.plain) == 0.0
+    starts, lengths = channel.runs
+    short = lengths < RESTING
+    step = lattice_step(channel.plain)
+    usual, noise = _repeats(channel.plain, step)
+    if noise < _ABOVE * step or not noise > 0.0:
+        return  # too quiet a sensor gives a value twice by itself
+    windows = same[: same.size // _WINDOW * _WINDOW].reshape(-1, _WINDOW)
+    resting = np.repeat(~short, lengths)[1:][: windows.size].reshape(-1, _WINDOW)
+    often = (np.mean(windows, axis=1) > usual + _MORE) & (np.mean(resting, axis=1) < 0.1)
+    # Bursts: runs that noise makes once in a thousand recordings; those on a limit are clipped.
+    seen = min(0.8, 1.3 * max(usual, float(np.median(np.mean(windows, axis=1))), 1e-3))
+    limit = max(3.0, 1.0 + np.log(1e-3 / channel.values.size) / np.log(seen))
+    inside = ~np.isin(channel.plain[starts], (channel.clean.min(), channel.clean.max()))
+    bursts = short & inside & (lengths > limit)
+    if np.mean(often) > _PART:
+        mask = np.zeros(channel.values.shape, dtype=np.bool_)
+        mask[1 : 1 + windows.size] = np.repeat(often, _WINDOW)
+        part = float(np.mean(often))
+        times = 1.0 / max(1.0 - float(np.mean(windows[often])), 1e-3)
+        text = (
+            f"{channel.name} repeats its values {times:.2g} times on average, at no fixed rate, in {share(part)} of the"
+            " recording"
+        )
+        where = () if part > 0.9 else channel.spans(mask, _WINDOW)
+        remedy = "" if channel.role == "input" else f"[recordings.columns.{channel.name}]\nindependent = true"
+        sure: Severity = "warning" if channel.role == "output" else "note"
+        yield channel.finding("held-samples", sure, text, where, remedy)
+    elif np.sum(bursts) >= _BURSTS:
+        mask = np.repeat(bursts, lengths)
+        text = (
+            f"{channel.name} holds its last value in {int(np.sum(bursts))} bursts of up to"
+            f" {int(lengths[bursts].max())} samples ({share(float(np.mean(mask)))}): values were lost on the way"
+        )
+        yield channel.finding("dropouts", "warning", text, channel.spans(mask))
+
+
+def _repeats(values: FloatArray, step: float) -> tuple[float, float]:
+    """Share of samples that equal the one before by chance, and the noise (1 σ) that says so; 0 if it is none."""
+    own = values[np.concatenate(([True], np.diff(values) != 0.0))]
+    bends = np.abs(np.diff(own, 2))
+    windows = np.median(bends[: bends.size // _WINDOW * _WINDOW].reshape(-1, _WINDOW), axis=1)
+    noise = white_noise(own) if windows.size >= _LEAST else 0.0
+    if noise > 0.0:  # a sensor's is there whatever the signal does
+        low, middle, high = np.quantile(windows, (0.2, 0.5, 0.8))
+        noise *= float(0.5 * middle < low and high < 2.0 * middle)
+    # Two of a normal distribution fall on one step of a lattice; without a lattice, hardly ever.
+    return (min(0.5 * step / (np.sqrt(np.pi) * noise), 0.6) if noise > 0.0 else 1.0), noise
 
 
 def resolution(channel: Channel) -> Iterator[Finding]:

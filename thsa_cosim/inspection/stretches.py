@@ -6,7 +6,7 @@ import numpy as np
 
 from thsa_cosim.inspection.channel import Channel, share
 from thsa_cosim.inspection.finding import Finding, Severity
-from thsa_cosim.recordings.noise import RESTING
+from thsa_cosim.recordings.noise import RESTING, white_noise
 from thsa_cosim.recordings.outliers import Mask
 from thsa_cosim.signals import FloatArray
 
@@ -15,6 +15,8 @@ _PILE = 8.0
 _LEAST_CLIPPED = 8
 _COMMANDED = 3e-4
 """Noise of an input, in shares of its range, below which it is a command rather than measured."""
+_HOPS = 8
+"""Short stays at a limit that make it one."""
 _LEAST_STUCK = 40.0
 _MUCH, _OFTEN = 0.1, 5
 """Independent samples of one value, share of the recording that is an error, stretches that are no defect."""
@@ -58,7 +60,17 @@ def _piles_up(values: FloatArray, limit: float, channel: Channel) -> bool:
     dithered = count > 3.0 * busiest and together > 0.25 and channel.noise > 2.0 * channel.quantum
     if count <= _PILE * busiest and not longer and not dithered:
         return False
-    return channel.steady or _runs_into(values, at, channel.quantum)
+    return (
+        channel.steady or _runs_into(values, at, channel.quantum) or _cut_noise(values, at, channel.quantum)
+    )
+
+
+def _cut_noise(values: FloatArray, at: Mask, quantum: float) -> bool:
+    """Whether noise hops onto the limit and off it, as noise that is cut does, and what comes to rest does not."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], at, [False]))))
+    lengths = edges[1::2] - edges[::2]
+    noise = white_noise(values[~at]) if np.sum(~at) >= 100 else 0.0
+    return bool(np.sum(lengths <= 3) >= max(_HOPS, 0.2 * lengths.size) and noise > 2.0 * quantum)
 
 
 def _runs_into(values: FloatArray, at: Mask, quantum: float) -> bool:

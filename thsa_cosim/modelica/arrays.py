@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from thsa_cosim.errors import ModelicaError
@@ -19,6 +20,14 @@ class Record:
     def __init__(self, type_name: str, fields: dict[str, Value]) -> None:
         self.type = type_name
         self.fields = fields
+
+
+@dataclass(frozen=True)
+class Partial:
+    """A function (its class) as a value, with some of its inputs given."""
+
+    target: Any
+    given: dict[str, Value]
 
 
 def shape(value: Value) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from thsa_cosim.errors import ModelicaError, did_you_mean
 from thsa_cosim.modelica import arrays
-from thsa_cosim.modelica.arrays import Record, Value, each, elements, fill, promote, shape, total
+from thsa_cosim.modelica.arrays import Partial, Record, Value, each, elements, fill, promote, shape, total
 from thsa_cosim.modelica.syntax import Syntax
 from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, make, plain, text
 
@@ -24,6 +24,7 @@ SCALAR = frozenset(
         """,
     )
 )
+MATH_H = SCALAR - {"abs", "sign", "div", "mod", "rem", "integer"}  # by the same name in C's math.h
 _REFUSED = frozenset(
     re.findall(
         r"\w+",
@@ -42,6 +43,12 @@ def call(evaluator: Evaluator, expression: Syntax) -> Value:
     if name.startswith("."):
         name = name[1:] if "." not in name[1:] else name
         expression = expression._replace(args=(name, arguments, named))
+    given = evaluator.local.get(name)
+    if isinstance(given, Partial):
+        from thsa_cosim.modelica.function import invoke
+
+        keyed = {**given.given, **{key: evaluator.value(a) for key, a in named.items()}}
+        return invoke(evaluator, given.target, [evaluator.value(a) for a in arguments], keyed, expression)
     if name in _TABLE:
         return _TABLE[name](evaluator, expression)
     if name in SCALAR:

@@ -12,7 +12,7 @@ from thsa_cosim.modelica.flat import Assertion, FlatEquation, Reinit
 from thsa_cosim.modelica.function import Statements
 from thsa_cosim.modelica.scope import DISABLED, Scope, Variable
 from thsa_cosim.modelica.syntax import Equation, Syntax
-from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, make, plain
+from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, make, plain, walk
 
 
 class Collector:
@@ -160,7 +160,8 @@ class Collector:
             sides.append([m for e in body for m in self.of(e, evaluator, initial, inner_guard)])
             remaining = make("and", remaining, make("not", condition))
         sides.append([m for e in last for m in self.of(e, evaluator, initial, remaining)])
-        if len({len(side) for side in sides}) > 1:
+        uneven = len({len(side) for side in sides}) > 1
+        if uneven or (evaluator.tuned([c for c, _ in chosen]) and (initial or not _assigns_alike(sides))):
             del self.assertions[kept[0] :], self.reinits[kept[1] :]
             return self._structural_if(chosen, last, evaluator, initial, guard, equation)
         return _selected([c for c, _ in chosen], sides, place)
@@ -210,7 +211,7 @@ class Collector:
         if given is not None and given.op == "name" and given.args[-1][0] == "warning":
             level = "warning"
         text = message if isinstance(message, str) else "an assertion is violated"
-        if condition is False and level == "error":
+        if level == "error" and (condition is False or evaluator.by_default(condition) is False):
             raise ModelicaError(f"{place}: an assertion fails: {text.rstrip('.')}.")
         self.assertions.append(Assertion(condition, text, level, place))
 
@@ -421,6 +422,14 @@ def _selected(conditions: list[Scalar], sides: list[list[FlatEquation]], place: 
             residual = make("if", condition, make("-", equation.left, equation.right), residual)
         made.append(FlatEquation(residual, 0.0, place))
     return made
+
+
+def _assigns_alike(sides: list[list[FlatEquation]]) -> bool:
+    """Whether all branches are ``variable = expression`` for the same variables, without derivatives."""
+    targets = [sorted(str(e.left) for e in side) for side in sides]
+    plain_left = all(isinstance(e.left, Term) and e.left.op == "ref" for side in sides for e in side)
+    rates = any(t.op == "der" for side in sides for e in side for t in walk([e.right]))
+    return plain_left and not rates and all(t == targets[0] for t in targets)
 
 
 def _connects(body: list[Equation]) -> bool:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from thsa_cosim.errors import ModelicaError, did_you_mean
 from thsa_cosim.modelica import builtin
 from thsa_cosim.modelica.arrays import (
+    Partial,
     Record,
     Value,
     binary,
@@ -22,7 +23,18 @@ from thsa_cosim.modelica.arrays import (
 from thsa_cosim.modelica.modifier import Binding
 from thsa_cosim.modelica.scope import DISABLED, Scope, Variable
 from thsa_cosim.modelica.syntax import Syntax
-from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, constant, make, plain, substitute, text
+from thsa_cosim.modelica.terms import (
+    Enumeration,
+    Scalar,
+    Term,
+    constant,
+    make,
+    names,
+    plain,
+    substitute,
+    text,
+    walk,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -104,7 +116,17 @@ class Evaluator:
         raise self.error(expression, "':' stands outside of a subscript.")
 
     def _function(self, expression: Syntax) -> Value:
-        raise self.error(expression, "a function as an argument is a limit of this exporter.")
+        """``function f(a = 1)`` as an argument: a function with some of its inputs given."""
+        name, _, named = expression.args
+        target = self.scope.find_class(name)
+        given = self.local.get(name)
+        if isinstance(given, Partial):
+            target, earlier = given.target, given.given
+        else:
+            earlier = {}
+        if target is None:
+            raise self.error(expression, f"the function {name} is not known.")
+        return Partial(target, {**earlier, **{key: self.value(a) for key, a in named.items()}})
 
     # -- operators
 
@@ -140,9 +162,30 @@ class Evaluator:
             conditions.append((chosen, self.value(branch)))
         else:
             result = self.value(otherwise)
+        if (
+            conditions
+            and self.tuned([c for c, _ in conditions])
+            and _has_rate([result, *(v for _, v in conditions)])
+        ):
+            chosen = [v for c, v in conditions if self.fixed(c, expression, "the condition of a derivative")]
+            return chosen[0] if chosen else result
         for condition, branch_value in reversed(conditions):
             result = self.select(condition, branch_value, result, expression)
         return result
+
+    def by_default(self, condition: Scalar) -> bool | None:
+        """What a condition on parameters that are no Reals is before they are set; None for other conditions."""
+        if not self.tuned([condition]):
+            return None
+        structural = set(self.scope.world.structural)
+        value = self.fixed(condition, Syntax("boolean", (False,)), "a condition")
+        self.scope.world.structural = structural
+        return bool(value)
+
+    def tuned(self, conditions: Sequence[Scalar]) -> bool:
+        """Whether conditions depend on nothing but parameters that are no Reals."""
+        used = {name for c in conditions for name in names(c)}
+        return bool(used) and used <= self.scope.world.tunable
 
     def select(self, condition: Scalar, yes: Value, no: Value, expression: Syntax) -> Value:
         """``if condition then yes else no`` for values of one shape."""
@@ -174,8 +217,8 @@ class Evaluator:
         d = self.structural(step, "the step of a range") if step else 1
         if isinstance(a, Enumeration):
             scope = self.scope.find_class(a.type)
-            names = scope.definition.literals if scope and scope.definition.literals else ()
-            return [Enumeration(a.type, names[k - 1], k) for k in range(a.index, plain(b) + 1)]
+            literals = scope.definition.literals if scope and scope.definition.literals else ()
+            return [Enumeration(a.type, literals[k - 1], k) for k in range(a.index, plain(b) + 1)]
         if all(isinstance(v, int) for v in (a, b, d)):
             return list(range(a, b + (1 if d > 0 else -1), d))
         count = int((b - a) / d + 1e-9) + 1
@@ -301,8 +344,12 @@ class Evaluator:
                         return self.member(base, name, where)
             if found is not None:
                 return found
-        names = list(node.elements) if isinstance(node, Scope) else []
-        raise self.error(where, f"{_written(where)}: there is no {name}.{did_you_mean(name, names)}")
+        if isinstance(node, Scope) and "expandable" in node.definition.prefixes:
+            raise self.error(
+                where, f"{_written(where)}: expandable connectors are a limit of this exporter ({node.path})."
+            )
+        known = list(node.elements) if isinstance(node, Scope) else []
+        raise self.error(where, f"{_written(where)}: there is no {name}.{did_you_mean(name, known)}")
 
     def _unknown(self, expression: Syntax, name: str) -> ModelicaError:
         known = [*self.scope.elements, *self.local]
@@ -324,9 +371,10 @@ class Evaluator:
                     return [
                         Enumeration(node.qualified, n, i + 1) for i, n in enumerate(node.definition.literals)
                     ]
+                if node.definition.kind == "function":
+                    return Partial(node, {})
                 raise self.error(where, f"{_written(where)} is a class, not a value.")
-            names = [n for n in node.elements if node.declares(n)]
-            fields = {n: node.component(n) for n in names}
+            fields = {n: node.component(n) for n in node.elements if node.declares(n)}
             return Record(
                 node.qualified, {n: self.of_node(f, where) for n, f in fields.items() if f is not DISABLED}
             )
@@ -382,6 +430,10 @@ class Evaluator:
         return builtin.call(self, expression)
 
 
+def _has_rate(values: Sequence[Value]) -> bool:
+    return any(term.op == "der" for value in values for term in walk(elements(value)))
+
+
 def _written(expression: Syntax) -> str:
     if expression.op == "name":
         return ".".join(part + ("[…]" if subscripts else "") for part, subscripts in expression.args)
@@ -395,9 +447,14 @@ def bound(binding: Binding) -> Value:
     if key not in cache:
         cache[key] = (Evaluator(binding.scope).value(binding.value), binding)
     value = cache[key][0]
-    for index in binding.indices:
+    for depth, index in enumerate(binding.indices):
         if not isinstance(value, list):
             break  # one value for all elements, as if it said each
+        if depth < len(binding.sizes) and len(value) != binding.sizes[depth]:
+            raise ModelicaError(
+                f"{binding.scope.place(binding.value.line)}: {len(value)} values are given for an array with "
+                f"{binding.sizes[depth]} elements."
+            )
         if not 1 <= index <= len(value):
             raise ModelicaError(
                 f"{binding.scope.place(binding.value.line)}: {len(value)} values are given for an array with more "
@@ -416,10 +473,27 @@ def variable_value(variable: Variable) -> Scalar:
     if variable.state == 0:
         variable.state = 1
         variable.value = _known(variable)
+        if _tunable(variable):
+            variable.scope.world.tunable.add(variable.name)
+            variable.value = Term("ref", (variable.name,))
         variable.state = 2
     elif variable.state == 1:
         raise ModelicaError(f"{variable.place}: the value of {variable.name} depends on itself.")
     return variable.value
+
+
+def _tunable(variable: Variable) -> bool:
+    """Whether a parameter that is no Real can be set in the FMU: the exported class' own one, with a plain value."""
+    return (
+        variable.variability == "parameter"
+        and variable.type in ("Integer", "Boolean", "enumeration")
+        and constant(variable.value)
+        and not variable.scope.world.folded
+        and not variable.final
+        and variable.scope.path == ""
+        and not {"protected", "fixed"} & variable.prefixes
+        and (variable.binding is None or variable.binding.scope is variable.scope)
+    )
 
 
 def _known(variable: Variable) -> Scalar:

@@ -12,7 +12,7 @@ class FlatVariable:
     ``variability`` is "continuous", "discrete", "parameter" or "constant"; ``causality`` is "input", "output" or
     "local" and counts at the top level only. ``type`` is "Real", "Integer" or "Boolean"; an enumeration is an Integer.
     Attributes are scalars over parameters, or None where they are not given. ``structural`` says that the value of a
-    parameter was used to build the model and is fixed at export.
+    parameter was used to build the model and is fixed at export; ``tunable`` that one that is no Real can be set.
     """
 
     name: str
@@ -32,6 +32,7 @@ class FlatVariable:
     state_select: str
     structural: bool
     place: str
+    tunable: bool = False
 
 
 @dataclass(frozen=True)

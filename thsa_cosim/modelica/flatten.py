@@ -8,6 +8,7 @@ from typing import Any
 
 from thsa_cosim.errors import ModelicaError, did_you_mean
 from thsa_cosim.modelica.arrays import Record
+from thsa_cosim.modelica.derivatives import with_rates
 from thsa_cosim.modelica.equations import Collector
 from thsa_cosim.modelica.evaluate import bound
 from thsa_cosim.modelica.flat import Experiment, FlatEquation, FlatModel, FlatVariable
@@ -16,19 +17,20 @@ from thsa_cosim.modelica.modifier import Binding
 from thsa_cosim.modelica.scope import Scope, Variable, World
 from thsa_cosim.modelica.syntax import ClassDefinition, Extends
 from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, constant, plain
+from thsa_cosim.modelica.types import check_types
 
 _DEPTH = 20_000
 
 
-def flatten_class(library: Library, name: str) -> FlatModel:
-    """Flatten a class by its qualified name.
+def flatten_class(library: Library, name: str, folded: bool = False) -> FlatModel:
+    """Flatten a class by its qualified name; ``folded`` fixes all its Boolean and Integer parameters.
 
     Raises ModelicaError, with file and line, for what is missing, wrong or outside the exportable subset.
     """
     limit = sys.getrecursionlimit()
     sys.setrecursionlimit(max(limit, _DEPTH))
     try:
-        return _flatten(library, name)
+        return _flatten(library, name, folded)
     finally:
         sys.setrecursionlimit(limit)
 
@@ -45,8 +47,9 @@ def class_scope(library: Library, name: str) -> Scope:
     return found
 
 
-def _flatten(library: Library, name: str) -> FlatModel:
+def _flatten(library: Library, name: str, folded: bool) -> FlatModel:
     declared = class_scope(library, name)
+    declared.world.folded = folded
     definition = declared.definition
     if definition.kind not in ("model", "block", "class") or "operator" in definition.prefixes:
         raise ModelicaError(
@@ -68,18 +71,24 @@ def _flatten(library: Library, name: str) -> FlatModel:
     if not world.variables:
         raise ModelicaError(f"{declared.place(definition.line)}: {name} has no variables.")
     variables = {v.name: _variable(v, collector, world) for v in world.variables.values() if v.type in _TYPES}
-    variables = {k: replace(v, structural=k in world.structural) for k, v in variables.items()}
-    return FlatModel(
+    open_ = world.tunable - world.structural
+    variables = {
+        k: replace(v, structural=k in world.structural, tunable=k in open_) for k, v in variables.items()
+    }
+    equations, initial, variables = with_rates(equations, collector.initial, variables)
+    flat = FlatModel(
         name=name,
         description=definition.description,
         variables=variables,
         equations=tuple(equations),
-        initial_equations=tuple(collector.initial),
+        initial_equations=tuple(initial),
         reinits=tuple(collector.reinits),
         assertions=tuple(collector.assertions),
         experiment=_experiment(declared),
         source_digest=library.digest(),
     )
+    check_types(flat)
+    return flat
 
 
 _TYPES = frozenset(("Real", "Integer", "Boolean", "enumeration"))
@@ -90,7 +99,7 @@ def _variable(variable: Variable, collector: Collector, world: World) -> FlatVar
     if variable.name in collector.discrete and variability == "continuous":
         variability = "discrete"
     causality = "local"
-    if "." not in variable.name:
+    if "." not in variable.name and "protected" not in variable.prefixes:
         causality = next((c for c in ("input", "output") if c in variable.prefixes), "local")
     fixed = _attribute(variable, "fixed")
     if fixed is not None and not isinstance(fixed, bool):

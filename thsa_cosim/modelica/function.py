@@ -156,10 +156,10 @@ class _Run:
         for name, element in _declared(target):
             declaration, owner, mod = resolved(element)
             if "input" in declaration.prefixes:
-                if given:
-                    self.env[name] = given.pop(0)
-                elif name in keyed:
+                if name in keyed:
                     self.env[name] = keyed[name]
+                elif given:
+                    self.env[name] = given.pop(0)
                 elif mod is not None and mod.binding is not None:
                     inner = Evaluator(mod.binding.scope, self.env, True)
                     self.env[name] = inner.value(mod.binding.value)
@@ -470,7 +470,7 @@ class _External:
         assert scope.definition.external is not None
         language, name = scope.definition.external
         inputs = [self.run.env[n] for n, e in _declared(self.target) if "input" in e.declaration.prefixes]
-        if language == "builtin":
+        if language == "builtin" or (language == "C" and name in builtin.MATH_H):
             short = scope.definition.name if name not in builtin.SCALAR else name
             if short in builtin.SCALAR:
                 return each(lambda *x: builtin.scalar(self.caller, short, *x), *inputs)

@@ -8,7 +8,7 @@ from typing import Any
 from thsa_cosim.errors import ModelicaError
 from thsa_cosim.modelica.arrays import shape
 from thsa_cosim.modelica.evaluate import Evaluator, bound
-from thsa_cosim.modelica.modifier import Binding, Modifier, element_of, merge
+from thsa_cosim.modelica.modifier import Binding, Modifier, element_of, merge, spread
 from thsa_cosim.modelica.scope import BUILTIN_TYPES, DISABLED, Element, Scope, Variable, resolved
 from thsa_cosim.modelica.syntax import Component, Syntax
 
@@ -22,6 +22,7 @@ ATTRIBUTES = frozenset(
 )
 _INHERITED = frozenset(["flow", "stream", "discrete", "parameter", "constant", "input", "output"])
 _MOST_ELEMENTS = 100_000
+_MOST_LEVELS = 60
 
 
 def instantiate(instance: Scope, name: str, element: Element) -> Any:
@@ -170,7 +171,8 @@ class _Maker:
         if sizes[0] > _MOST_ELEMENTS:
             raise ModelicaError(f"{self.owner.place(self.declaration.line)}: {path} has {sizes[0]} elements.")
         return [
-            self.array(path, element_of(given, k), sizes[1:], (*indices, k)) for k in range(1, sizes[0] + 1)
+            self.array(path, element_of(given, k, sizes[0]), sizes[1:], (*indices, k))
+            for k in range(1, sizes[0] + 1)
         ]
 
     def element(self, path: str, given: Modifier | None) -> Any:
@@ -189,15 +191,22 @@ class _Maker:
                 f"{self.owner.place(self.declaration.line)}: the class {target.qualified} of {path} is partial: it "
                 "has to be redeclared."
             )
-        return Scope(
+        if path.count(".") > _MOST_LEVELS:
+            raise ModelicaError(
+                f"{self.owner.place(self.declaration.line)}: {target.qualified} contains itself without end."
+            )
+        made = Scope(
             self.instance.world,
             target.definition,
             target.parent,
-            merge(given, target.given),
+            merge(spread(given), target.given),
             path=path,
             container=self.instance,
-            prefixes=self.prefixes,
+            prefixes=self.prefixes - {"protected"},
+            original=target.original,
         )
+        made.check_modified(made.given)
+        return made
 
     def _with_record(self, path: str, given: Modifier | None) -> Modifier | None:
         """A field takes its value from the value of the record that it belongs to."""
@@ -246,7 +255,9 @@ class _Maker:
             path,
             kind,
             variability,
-            self.prefixes | (declaration.prefixes & frozenset(("inner",))),
+            self.prefixes
+            | (declaration.prefixes & frozenset(("inner",)))
+            | (frozenset(("protected",)) if declaration.protected else frozenset()),
             declaration.description,
             given.binding if given else None,
             found,

@@ -17,12 +17,13 @@ class Binding(NamedTuple):
     scope: Scope
     indices: tuple[int, ...] = ()
     final: bool = False
+    sizes: tuple[int, ...] = ()  # of the arrays that the indices are for, where they are known
 
 
 class Modifier:
     """What is said about one element: its value, its own elements, its replacement."""
 
-    __slots__ = ("binding", "children", "each", "final", "lines", "redeclare")
+    __slots__ = ("binding", "children", "each", "final", "place", "redeclare")
 
     def __init__(
         self,
@@ -37,7 +38,7 @@ class Modifier:
         self.redeclare = redeclare
         self.each = each
         self.final = final
-        self.lines: dict[str, int] = {}
+        self.place = ""
 
     def child(self, name: str) -> Modifier | None:
         """What is said about an element by its name."""
@@ -54,13 +55,13 @@ def modifier(
     for argument in arguments:
         nested = modifier(argument.nested, argument.value, scope, argument.final) or Modifier()
         nested.each, nested.final = argument.each, argument.final
+        nested.place = scope.place(argument.line)
         if argument.redeclare is not None:
             nested.redeclare = (argument.redeclare, scope)
         earlier = made.children.get(argument.name)
         merged = merge(nested, earlier)
         assert merged is not None
         made.children[argument.name] = merged
-        made.lines[argument.name] = argument.line
     return made
 
 
@@ -82,22 +83,35 @@ def merge(outer: Modifier | None, inner: Modifier | None) -> Modifier | None:
         outer.each if outer.binding or outer.children else inner.each,
         outer.final or inner.final,
     )
-    made.lines = {**inner.lines, **outer.lines}
+    made.place = outer.place or inner.place
     return made
 
 
-def element_of(given: Modifier | None, index: int) -> Modifier | None:
-    """The part of an array's modification that is for one element, by its subscript from 1."""
+def element_of(given: Modifier | None, index: int, size: int) -> Modifier | None:
+    """The part of an array's modification that is for one of ``size`` elements, by its subscript from 1."""
     if given is None or given.each:
         return given
     binding = given.binding
     if binding is not None:
-        binding = binding._replace(indices=(*binding.indices, index))
+        binding = binding._replace(indices=(*binding.indices, index), sizes=(*binding.sizes, size))
     children = {}
     for name, child in given.children.items():
-        part = element_of(child, index)
+        part = element_of(child, index, size)
         assert part is not None
         children[name] = part
     made = Modifier(binding, children, given.redeclare, given.each, given.final)
-    made.lines = given.lines
+    made.place = given.place
+    return made
+
+
+def spread(given: Modifier | None) -> Modifier | None:
+    """The modification of one element of an array: what stood behind ``each`` is now its own."""
+    if given is None or not any(child.each for child in given.children.values()):
+        return given
+    children = {}
+    for name, child in given.children.items():
+        children[name] = Modifier(child.binding, child.children, child.redeclare, False, child.final)
+        children[name].place = child.place
+    made = Modifier(given.binding, children, given.redeclare, given.each, given.final)
+    made.place = given.place
     return made

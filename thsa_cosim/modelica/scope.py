@@ -71,6 +71,8 @@ class World:
     instances: list[Scope] = field(default_factory=list)
     variables: dict[str, Variable] = field(default_factory=dict)
     structural: set[str] = field(default_factory=set)
+    tunable: set[str] = field(default_factory=set)  # Boolean and Integer parameters that stay open
+    folded: bool = False  # none of them does
     definitions: dict[int, Scope] = field(default_factory=dict)
 
     def top(self, name: str) -> Scope | None:
@@ -97,6 +99,7 @@ class Scope:
         container: Scope | None = None,
         derived: Scope | None = None,
         prefixes: frozenset[str] = frozenset(),
+        original: tuple[ClassDefinition, Scope | None] | None = None,
     ) -> None:
         self.world = world
         self.definition = definition
@@ -106,6 +109,7 @@ class Scope:
         self.container = container
         self.instance: Scope = derived.instance if derived else self
         self.prefixes = prefixes
+        self.original = original  # what a "redeclare class extends" extends
         self.nodes: dict[str, Any] = {}
         self.bases: list[Scope] = []
         self.builtin: tuple[str, Modifier | None] | None = None
@@ -149,15 +153,23 @@ class Scope:
             ):
                 redeclared[element.name] = Modifier(redeclare=(element, self))
         outer = merge(self.given, Modifier(children=redeclared)) if redeclared else self.given
+        if self.original is not None:
+            self._inherit_scope(
+                *self.original, merge(outer, modifier(definition.arguments, None, self)), found
+            )
         if definition.base is not None:
             self._inherit(definition.base, definition.arguments, outer, definition.line, found)
             return
         for element in definition.elements:
             if isinstance(element, Extends):
                 self._inherit(element.type, element.arguments, outer, element.line, found)
+        own: set[str] = set()
         for element in definition.elements:
             if isinstance(element, (Extends, Import)):
                 continue
+            if element.name in own:
+                raise ModelicaError(f"{self.place(element.line)}: {element.name} is declared twice.")
+            own.add(element.name)
             if element.name in redeclared and element.name in found:
                 continue
             if element.name in found and isinstance(element, Component):
@@ -183,21 +195,46 @@ class Scope:
             target = around.find_class(base, inherited=short)
         if target is None or target is self:
             raise self.unknown_class(base, line)
+        merged = merge(given, target.given)
+        scope = self._inherit_scope(target.definition, target.parent, merged, found, target.original)
+        if scope.builtin is None:
+            scope.check_modified(modifier(arguments, None, around or self))
+
+    def _inherit_scope(
+        self,
+        definition: ClassDefinition,
+        parent: Scope | None,
+        given: Modifier | None,
+        found: dict[str, Element],
+        original: tuple[ClassDefinition, Scope | None] | None = None,
+    ) -> Scope:
         scope = Scope(
             self.world,
-            target.definition,
-            target.parent,
-            merge(given, target.given),
+            definition,
+            parent,
+            given,
             path=self.path,
             container=self.container,
             derived=self,
             prefixes=self.prefixes,
+            original=original,
         )
         self.bases.append(scope)
         elements = scope.elements
         if scope.builtin is not None:
             self.builtin = scope.builtin
         found.update({name: e for name, e in elements.items() if name not in found})
+        return scope
+
+    def check_modified(self, given: Modifier | None) -> None:
+        """Raises ModelicaError where a modification names something that the class does not have."""
+        for name, child in (given.children if given else {}).items():
+            if name in self.elements or self.world.library.nested(self.definition, name) is not None:
+                continue
+            place = f"{child.place}: " if child.place else ""
+            raise ModelicaError(
+                f"{place}{self.qualified} has no {name} to modify.{did_you_mean(name, list(self.elements))}"
+            )
 
     def unknown_class(self, name: str, line: int) -> ModelicaError:
         """The error for a class that is not found."""
@@ -295,11 +332,16 @@ class Scope:
         assert isinstance(declaration, ClassDefinition)
         if given is not None and given.redeclare is not None:
             replacement, scope = given.redeclare
-            assert isinstance(replacement, ClassDefinition)
-            if replacement.extending:
-                return self._extended(replacement, scope, declaration, owner, given)
+            if not isinstance(replacement, ClassDefinition):
+                raise ModelicaError(
+                    f"{scope.place(replacement.line)}: {declaration.name} is a class, not a component."
+                )
             rest = Modifier(None, given.children)
             constraint = _constraint(declaration, owner)
+            if replacement.extending:
+                original = (declaration, owner)
+                return Scope(self.world, replacement, scope, merge(rest, constraint), original=original)
+            check_replaceable(element, scope, replacement)
             if replacement.name == replacement.base:  # redeclare model A = A: the outer A
                 outside = scope.parent or scope
                 target = outside.find_class(replacement.base)
@@ -308,19 +350,6 @@ class Scope:
                     return Scope(self.world, target.definition, target.parent, merge(rest, inner))
             return Scope(self.world, replacement, scope, merge(rest, constraint))
         return Scope(self.world, declaration, owner, given)
-
-    def _extended(
-        self,
-        replacement: ClassDefinition,
-        scope: Scope,
-        original: ClassDefinition,
-        owner: Scope,
-        given: Modifier,
-    ) -> Scope:
-        raise ModelicaError(
-            f"{scope.place(replacement.line)}: class extends {replacement.name} is a limit of this exporter; declare "
-            "the class under a name of its own and redeclare it."
-        )
 
     # -- components
 
@@ -366,6 +395,30 @@ def _constraint(declaration: Component | ClassDefinition, owner: Scope) -> Modif
     return None
 
 
+def check_replaceable(element: Element, scope: Scope, replacement: Component | ClassDefinition) -> None:
+    """Raises ModelicaError where what is redeclared is not replaceable, or the class does not fit the constraint."""
+    declaration, owner, _ = element
+    place = scope.place(replacement.line)
+    if not declaration.prefixes & {"replaceable", "redeclare"}:
+        raise ModelicaError(f"{place}: {declaration.name} is redeclared, but is not declared replaceable.")
+    if not (isinstance(declaration, Component) and isinstance(replacement, Component)):
+        return
+    wanted = owner.find_class(declaration.constraint[0] if declaration.constraint else declaration.type)
+    given = scope.find_class(replacement.type)
+    if wanted is None or given is None or wanted.definition is given.definition:
+        return
+    missing = [
+        name
+        for name, (part, *_) in wanted.elements.items()
+        if isinstance(part, Component) and not part.protected and name not in given.elements
+    ]
+    if missing:
+        raise ModelicaError(
+            f"{place}: {given.qualified} cannot replace {declaration.name}: it has no {missing[0]}, unlike "
+            f"{wanted.qualified}."
+        )
+
+
 def resolved(element: Element) -> tuple[Component, Scope, Modifier | None]:
     """Declaration, scope and modification of a component after redeclaration."""
     declaration, owner, given = element
@@ -373,7 +426,11 @@ def resolved(element: Element) -> tuple[Component, Scope, Modifier | None]:
     if given is None or given.redeclare is None:
         return declaration, owner, merge(given, modifier(declaration.arguments, declaration.value, owner))
     replacement, scope = given.redeclare
-    assert isinstance(replacement, Component)
+    if not isinstance(replacement, Component):
+        raise ModelicaError(
+            f"{scope.place(replacement.line)}: {declaration.name} is a component, not a class."
+        )
+    check_replaceable(element, scope, replacement)
     outer = Modifier(given.binding, given.children, None, given.each, given.final)
     own = modifier(replacement.arguments, replacement.value, scope)
     merged = merge(merge(outer, own), _constraint(declaration, owner))

@@ -12,6 +12,9 @@ from thsa_cosim.recordings.table import RawColumn
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import conversion, convert, same_dimension
 
+_ABSURD = 1e100
+"""Above this nothing is measured, and squares overflow."""
+
 
 @dataclass(frozen=True)
 class TimeAxis:
@@ -118,6 +121,13 @@ def check_finite(path: Path, asked: str, values: FloatArray, time: FloatArray, k
         raise RecordingError(
             f"{path}: column {asked!r} is {values[k]} at {time[k]:g} s (sample {k + 1}, {bad.size} in all);"
             f" repair the file or cut it with recordings.time.start and .stop."
+        )
+    absurd = np.flatnonzero((np.abs(values) > _ABSURD) & np.asarray(kept) & np.isfinite(values))
+    if absurd.size:
+        k = int(absurd[0])
+        raise RecordingError(
+            f"{path}: column {asked!r} is {values[k]:g} at {time[k]:g} s (sample {k + 1}, {absurd.size} in all), which"
+            f" nothing measures; if it means that there is no value, list it as missing in recordings.columns."
         )
 
 

@@ -4,6 +4,10 @@ A slow channel in a fast table repeats each value (held), or is filled in betwee
 happens from one sample to the next: a held channel changes, and a linearly interpolated one bends, only at every
 P-th sample. The share of changes (or bends) that agree with the best period P is read off the spectrum of where
 they are, so that P need not be whole: 300 Hz in a 1 kHz table changes after 3, 3 and 4 samples in turn.
+
+Filled in by a spline, by a resampler's sinc, or by lines that were rounded afterwards, or run through a low-pass, a
+channel bends everywhere, but its noise is smooth: second differences over m samples grow with m, up to where samples
+have nothing to do with each other, and stay there. White noise does not grow, motion does not stay.
 """
 
 from dataclasses import dataclass
@@ -18,6 +22,17 @@ _LEAST_MARKS = 30
 """Changes or bends that make a pattern."""
 _LONGEST = 1000
 """Samples; longer periods are not looked for."""
+_SPREADS: NDArray[np.intp] = np.unique(np.round(2.0 ** np.arange(0.0, 7.01, 0.5)).astype(np.intp))
+"""Samples over which second differences are taken."""
+_GROWN, _LEVEL = 0.45, 0.72
+"""Smooth noise: what neighbours differ by, in shares of what independent samples do, at most; how level these are.
+Set on the recordings that ship and on public ones of three drives."""
+_LATTICE = 6.0
+"""Quantisation steps that smooth noise has to reach: less is the lattice's own."""
+_REST = 25
+"""Samples of one value in a row that are no noise at all."""
+_QUIET = 0.25
+"""Share of the windows that counts: those in which least moves."""
 _BEND = 1e-6
 """Share of a channel's typical bend below which it runs straight: the rounding of a text file's digits."""
 
@@ -26,16 +41,20 @@ _BEND = 1e-6
 class Independence:
     """``kind``: how samples between the ``fresh`` ones came about, None if all are measured; ``period``: samples.
 
+    ``"interpolated"`` runs straight between the fresh ones, ``"smooth"`` in any other way: by a spline or a low-pass.
     ``fresh`` holds indices into the samples.
     """
 
-    kind: Literal["held", "interpolated"] | None
+    kind: Literal["held", "interpolated", "smooth"] | None
     period: float
     fresh: NDArray[np.intp]
 
 
-def independence(values: FloatArray) -> Independence:
-    """Return which of (n,) finite ``values`` are independent of the one before."""
+def independence(values: FloatArray, *, smooth: bool = True) -> Independence:
+    """Return which of (n,) finite ``values`` are independent of the one before.
+
+    Without ``smooth``, noise is taken for white: what a fit leaves may be smooth by itself.
+    """
     everything = Independence(None, 1.0, np.arange(values.size))
     if values.size < 3 * _LEAST_MARKS:
         return everything
@@ -47,7 +66,52 @@ def independence(values: FloatArray) -> Independence:
     period = _period(bends, values.size)
     if period is not None:
         return Independence("interpolated", period, bends)
+    correlated = _correlated(values) if smooth else None
+    if correlated is not None:
+        return Independence("smooth", float(correlated), np.arange(0, values.size, correlated))
     return everything
+
+
+def _correlated(values: FloatArray) -> int | None:
+    """Over how many samples the noise on (n,) values is smooth; None if it is white, or cannot be seen."""
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0.0) + 1))
+    lengths = np.diff(np.concatenate((starts, [values.size])))
+    values = values[np.repeat(lengths < _REST, lengths)]  # a sensor that is stuck, or rests
+    if values.size < 3 * _LEAST_MARKS:
+        return None
+    window = max(24, min(128, values.size // 50))
+    levels: list[float] = []
+    for m in _SPREADS:
+        bends = np.abs(values[: -2 * m] - 2.0 * values[m:-m] + values[2 * m :])
+        windows = bends[: bends.size // window * window].reshape(-1, window)
+        if windows.shape[0] < 8:
+            break
+        middles = np.median(windows, axis=1)
+        middles = middles[middles > 0.0]
+        if middles.size < max(6, 0.5 * windows.shape[0]):
+            return None  # mostly at rest, or on a coarse lattice
+        levels.append(float(np.quantile(middles, _QUIET)))
+    for k in range(1, len(levels) - 3):
+        grown, level = (
+            levels[0] < _GROWN * levels[k],
+            min(levels[k : k + 4]) > _LEVEL * max(levels[k : k + 4]),
+        )
+        # A ripple of the motion comes back to itself after its period: noise never does.
+        if grown and level and min(levels[k:]) > _LEVEL * levels[k]:
+            return int(_SPREADS[k]) if levels[k] > _LATTICE * lattice_step(values) else None
+    return None
+
+
+def lattice_step(values: FloatArray) -> float:
+    """Return the usual smallest distance of two different ones of (n,) values; 0 if all are equal.
+
+    On a lattice this is its step; without one, it is far below any noise.
+    """
+    found = np.unique(values)
+    gaps = np.diff(found)
+    largest = np.maximum(np.abs(found[:-1]), np.abs(found[1:]))
+    gaps = gaps[gaps > 64 * float(np.finfo(np.float32).eps) * largest]  # levels split by rounding are one
+    return float(np.median(gaps[gaps <= 1.5 * np.quantile(gaps, 0.1)])) if gaps.size else 0.0
 
 
 def _bends(values: FloatArray) -> NDArray[np.intp]:

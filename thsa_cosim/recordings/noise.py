@@ -5,8 +5,8 @@ standard deviation s into one of ``sqrt(6) s`` (1 + 4 + 1). Clipping at four sta
 removes the kinks and steps of the signal itself, and spikes. Noise that is coloured, or a signal that bends all
 the time, biases the estimate: give the noise in the scenario then.
 
-Samples that are held or interpolated (``independence``) carry no noise of their own: the estimate takes one
-sample of each group. Codes for missing values (``outliers``) are left out.
+Samples that are held, interpolated or smoothed (``independence``) carry no noise of their own: the estimate takes
+one sample of each group. Codes for missing values (``outliers``) are left out.
 
 A quantised signal with step q cannot be known better than ``q / sqrt(12)`` (uniform rounding error), however
 quiet it looks: that is the floor.
@@ -39,15 +39,17 @@ def quantum(values: FloatArray) -> float:
     if gaps.size == 0:
         return 0.0
     step = float(np.median(gaps[gaps <= 1.5 * gaps.min()]))
-    multiples = gaps / step
-    off_lattice = np.abs(multiples - np.round(multiples)) > 0.05
+    with np.errstate(over="ignore", invalid="ignore"):
+        multiples = gaps / step
+        off_lattice = ~(np.abs(multiples - np.round(multiples)) <= 0.05)
     return step if np.mean(off_lattice) <= 0.01 else 0.0
 
 
-def noise_estimate(values: FloatArray) -> float:
+def noise_estimate(values: FloatArray, *, smooth: bool = True) -> float:
     """Return the standard deviation of the white noise on (n,) equally spaced ``values``, in their unit.
 
     0 means that no noise can be seen: fewer than 16 independent samples, or a signal that never changes.
+    ``smooth``: whether noise may be smooth, as :func:`independence`.
     """
     if values.size < _LEAST:
         return 0.0
@@ -55,7 +57,7 @@ def noise_estimate(values: FloatArray) -> float:
     if not np.isfinite(largest) or largest > 1e150:
         return 0.0
     values = values[~far_values(values)]
-    found = independence(values)
+    found = independence(values, smooth=smooth)
     fresh = values[found.fresh] if found.kind else values
     fresh = _without_rest(fresh)
     return white_noise(fresh) if fresh.size >= _LEAST else 0.0

@@ -10,17 +10,21 @@ The ``tune_`` modules are the same for tunings, which need no recordings.
 from thsa_cosim.scenario.executor import Executor, OpenRunner
 from thsa_cosim.scenario.loading import AnyScenario, load
 from thsa_cosim.scenario.model import (
-    BalanceSpec,
     BlackBoxSpec,
-    Channel,
-    CostSpec,
     DiagnoseSpec,
     ForceSpec,
     Scenario,
     TemperaturePoint,
 )
 from thsa_cosim.scenario.recorded import load_scenario
-from thsa_cosim.scenario.schema import KINDS, LawTable, SearchTable, SimulationTable
+from thsa_cosim.scenario.schema import (
+    KINDS,
+    BalanceTable,
+    ChannelTable,
+    LawTable,
+    SearchTable,
+    SimulationTable,
+)
 from thsa_cosim.scenario.source import Source
 from thsa_cosim.scenario.stages import Stage, StagedScenario, hand_on
 from thsa_cosim.scenario.table import Table
@@ -30,10 +34,9 @@ from thsa_cosim.scenario.tune_model import TuneScenario
 __all__ = [
     "KINDS",
     "AnyScenario",
-    "BalanceSpec",
+    "BalanceTable",
     "BlackBoxSpec",
-    "Channel",
-    "CostSpec",
+    "ChannelTable",
     "DiagnoseSpec",
     "Executor",
     "ForceSpec",

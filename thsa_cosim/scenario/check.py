@@ -9,7 +9,7 @@ from thsa_cosim.errors import ParameterError, ScenarioError, UnitError, did_you_
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.scenario.formula import parse_formula
-from thsa_cosim.scenario.model import BalanceSpec, BlackBoxSpec, DiagnoseSpec, ForceSpec
+from thsa_cosim.scenario.model import BlackBoxSpec, DiagnoseSpec, ForceSpec
 from thsa_cosim.scenario.schema import (
     CommonTable,
     DiagnoseOptionsTable,
@@ -142,7 +142,7 @@ def force(table: IdentifyTable, fmu: FmuDescription, measured: tuple[str, ...]) 
     mass = settable(fmu, spec.mass, "force.mass").start
     if not isinstance(mass, float):
         raise ScenarioError(f"force.mass: {spec.mass!r} of {fmu.path.name} has no number as its start value.")
-    return ForceSpec(**spec.model_dump(), mass_at_start=mass)
+    return ForceSpec.resolved(spec, mass_at_start=mass)
 
 
 def diagnosis(
@@ -157,7 +157,7 @@ def diagnosis(
                 f"diagnose.{key}: {name!r} is no input with a column.{did_you_mean(name, inputs)}"
             )
     for balance in spec.balances:
-        for name in _several(balance.moving):
+        for name in balance.moving_signals:
             if name not in (*inputs, *measured):
                 raise ScenarioError(
                     f"diagnose.balances[{balance.name}].moving: {name!r} has no column."
@@ -172,26 +172,13 @@ def diagnosis(
         raise ScenarioError(
             f"diagnose.catalogue: there is no folder {own}; correct the path.{did_you_mean_path(own)}"
         )
-    return DiagnoseSpec(
-        model=spec.model,
+    return DiagnoseSpec.resolved(
+        spec,
         package=package,
-        effects=tuple(spec.effects),
         catalogue=own,
-        most=spec.most,
         spreads={p.name: spec.spread if p.spread is None else p.spread for p in table.parameters},
-        command=spec.command,
-        load=spec.load,
-        empirical=spec.empirical,
-        balances=tuple(
-            BalanceSpec(b.name, b.unit, b.left, tuple(b.terms), _several(b.moving), b.band)
-            for b in spec.balances
-        ),
         blackbox=_black_box(path, spec, fmu),
     )
-
-
-def _several(names: str | list[str]) -> tuple[str, ...]:
-    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def _black_box(path: Path, spec: DiagnoseOptionsTable, fmu: FmuDescription) -> BlackBoxSpec | None:

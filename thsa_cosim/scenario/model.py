@@ -6,63 +6,28 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from statistics import median
-from typing import Literal
 
 from thsa_cosim.errors import ScenarioError
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.inspection import Inspection, inspect
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario.schema import CommonTable, LawTable, SearchTable, SimulationTable
+from thsa_cosim.scenario.schema import (
+    CommonTable,
+    CostTable,
+    DiagnoseOptionsTable,
+    ForceTable,
+    LawTable,
+    SearchTable,
+    SimulationTable,
+)
 from thsa_cosim.signals import Signals
 
 
-@dataclass(frozen=True)
-class Channel:
-    """A compared output; ``noise`` in its FMU unit, None: each recording's own estimate; ``band`` in Hz, None: all."""
+class ForceSpec(ForceTable):
+    """``[force]`` with the ``mass_at_start``: the parameter's value in the FMU, in its unit."""
 
-    weight: float = 1.0
-    noise: float | None = None
-    band: float | None = None
-
-
-@dataclass(frozen=True)
-class CostSpec:
-    """Eq. 6: which channels are compared, how, and when (s after the first sample)."""
-
-    error: Literal["squared", "absolute", "huber"] = "squared"
-    channels: Mapping[str, Channel] = field(default_factory=dict)
-    start: float | None = None
-    stop: float | None = None
-    mask: tuple[tuple[float, float], ...] = ()
-    also: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class ForceSpec:
-    """The force residual: measured outputs, the FMU parameter for the mass, ``band`` [Hz], ``period`` [s] of a lap.
-
-    ``mass_at_start`` is the parameter's value in the FMU, in its unit.
-    """
-
-    position: str
-    force: str
-    mass: str
     mass_at_start: float
-    band: float
-    period: float | None = None
-
-
-@dataclass(frozen=True)
-class BalanceSpec:
-    """``left`` ≈ Σ c_k ``terms[k]`` between measured signals, below ``band`` Hz, while all of ``moving`` move."""
-
-    name: str
-    unit: str
-    left: str
-    terms: tuple[str, ...]
-    moving: tuple[str, ...] = ()
-    band: float = 20.0
 
 
 @dataclass(frozen=True)
@@ -81,24 +46,16 @@ class BlackBoxSpec:
     voltage: str | None = None
 
 
-@dataclass(frozen=True)
-class DiagnoseSpec:
-    """Which model gets effects, which effects are tried, and how far parameters may be off the drawing.
+class DiagnoseSpec(DiagnoseOptionsTable):
+    """``[diagnose]`` with its folders found, and how far each parameter may be off the drawing.
 
-    ``spreads``: relative standard deviation by parameter name. ``command`` and ``load`` are inputs of the FMU.
+    ``spreads``: relative standard deviation by parameter name.
     """
 
-    model: str | None
-    package: Path
-    effects: tuple[str, ...]
-    catalogue: Path | None
-    most: int
+    package: Path  # type: ignore[assignment]
+    catalogue: Path | None  # type: ignore[assignment]
     spreads: Mapping[str, float]
-    command: str | None
-    load: str | None
-    empirical: bool
-    balances: tuple[BalanceSpec, ...]
-    blackbox: BlackBoxSpec | None = None
+    blackbox: BlackBoxSpec | None = None  # type: ignore[assignment]
     """Of an FMU without source: ``model`` is None then."""
 
 
@@ -147,7 +104,7 @@ class Scenario:
     fixed: Mapping[str, float]
     parameters: ParameterSpace
     laws: Mapping[str, LawTable]
-    cost: CostSpec
+    cost: CostTable
     search: SearchTable
     simulation: SimulationTable
     round_to: float = 1.0
@@ -168,6 +125,11 @@ class Scenario:
         return Inspection.of(tuple(kept), found.repairs)
 
     @property
+    def file_units(self) -> Mapping[str, str | None]:
+        """Unit of each signal's numbers in the files, as the scenario gives it; None: as the file states it."""
+        return {name: column.unit for name, column in self.table.recordings.columns.items()}
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What the recordings' reader has to say about them."""
         return tuple(note for recording in (*self.fit, *self.validate) for note in recording.notes)
@@ -184,7 +146,8 @@ class Scenario:
         spec = self.cost.channels.get(channel)
         own = recording.noise[channel]
         seen = [r.noise[channel] for r in self.fit if r.noise.get(channel, 0.0) > 0.0]
-        noise = spec.noise if spec is not None and spec.noise is not None else median(seen or [own])
+        given = None if spec is None else spec.given_noise
+        noise = median(seen or [own]) if given is None else given
         if not noise > 0 or not math.isfinite(noise):
             raise ScenarioError(
                 f"{self.path}: no noise can be seen on {channel!r} in {recording.path};"

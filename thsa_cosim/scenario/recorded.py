@@ -14,16 +14,13 @@ from thsa_cosim.recordings import Column, Recording, TimeAxis, read_recording
 from thsa_cosim.scenario import check
 from thsa_cosim.scenario.files import expand, named
 from thsa_cosim.scenario.law_search import with_laws
-from thsa_cosim.scenario.model import (
-    Channel,
-    CostSpec,
-    Scenario,
-    TemperaturePoint,
-)
+from thsa_cosim.scenario.model import Scenario, TemperaturePoint
 from thsa_cosim.scenario.recording_schema import TemperatureTable
 from thsa_cosim.scenario.schema import (
     KINDS,
+    ChannelTable,
     CommonTable,
+    CostTable,
     DiagnoseTable,
     IdentifyTable,
     LawTable,
@@ -218,7 +215,7 @@ def _laws(table: CommonTable) -> dict[str, LawTable]:
     return {p.name: p.law for p in table.parameters if p.law is not None}
 
 
-def _cost(table: CommonTable, measured: Sequence[str], inputs: Sequence[str]) -> CostSpec:
+def _cost(table: CommonTable, measured: Sequence[str], inputs: Sequence[str]) -> CostTable:
     cost = table.cost
     for name in cost.channels:
         if name in inputs:
@@ -228,14 +225,10 @@ def _cost(table: CommonTable, measured: Sequence[str], inputs: Sequence[str]) ->
                 f"cost.channels.{name} has no recorded column; add [recordings.columns.{name}] or remove it."
                 f"{did_you_mean(name, measured)}"
             )
-    channels = {
-        name: Channel(c.weight, None if isinstance(c.noise, str) else float(c.noise), c.band)
-        for name, c in cost.channels.items()
-    } or {name: Channel() for name in measured}
+    channels = cost.channels or {name: ChannelTable() for name in measured}
     if isinstance(table, IdentifyTable) and not channels:
         raise ScenarioError("recordings.columns names inputs only; add a measured output to compare with.")
-    mask = tuple((pair[0], pair[1]) for pair in cost.mask)
-    return CostSpec(cost.error, channels, cost.window.start, cost.window.stop, mask, tuple(cost.also))
+    return CostTable.resolved(cost, channels=channels)
 
 
 def _search(table: CommonTable, space: ParameterSpace) -> SearchTable:

@@ -117,6 +117,11 @@ class ChannelTable(Table):
             )
         return self
 
+    @property
+    def given_noise(self) -> float | None:
+        """``noise`` as a number; None where it is to be estimated."""
+        return None if isinstance(self.noise, str) else float(self.noise)
+
     @field_validator("noise")
     @classmethod
     def _noise(cls, noise: float | str) -> float | str:
@@ -290,6 +295,11 @@ class BalanceTable(Table):
     """Signals; samples where one is nearly zero are left out, since stiction leaves the balance open there."""
     band: Positive = 20.0
     """Hz; both sides are low-passed alike, without phase shift."""
+
+    @property
+    def moving_signals(self) -> tuple[str, ...]:
+        """``moving`` as names, whether one or several were given."""
+        return (self.moving,) if isinstance(self.moving, str) else tuple(self.moving)
 
 
 class BlackBoxTable(Table):

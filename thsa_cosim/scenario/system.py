@@ -37,6 +37,7 @@ def assemble_tables(path: Path, table: ModelTable) -> Path:
             c.step,
             c.delay,
             {k: float(v) for k, v in c.start.items()},
+            c.jitter,
         )
         for c in table.components
     ]
@@ -44,7 +45,10 @@ def assemble_tables(path: Path, table: ModelTable) -> Path:
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise ScenarioError(f"components: two are named {twice!r}; give each its own name.")
-    wires = [Wire(c.source, c.target, c.factor, c.offset, c.convert) for c in table.connections]
+    wires = [
+        Wire(c.source, c.target, c.factor, c.offset, c.convert, c.disturbance or "")
+        for c in table.connections
+    ]
     pins = {name: [given] if isinstance(given, str) else given for name, given in table.connectors.items()}
     return assembled(path.stem, parts, wires, pins)
 

@@ -23,6 +23,9 @@ class ComponentTable(Table):
     """Communication step or sampling interval, s. Default for a coupled component: what its FMU suggests."""
     delay: NotNegative = 0.0
     """Time from a tick of a sampled component until its outputs change, s; at most one step."""
+    jitter: NotNegative = 0.0
+    """Each tick of a sampled component comes up to so much later than due, s (uniformly distributed, the same in
+    every run); ``delay`` + ``jitter`` at most one step."""
     start: dict[Name, float | bool] = Field(default_factory=dict)
     """Start values by variable of this FMU, in its units."""
 
@@ -38,6 +41,9 @@ class ConnectionTable(Table):
     """input = factor * output + offset, before units are converted."""
     offset: Moderate = 0.0
     """In the output's unit."""
+    disturbance: Name | None = None
+    """Name of an input of the system that is added to the target, in its unit: a fault of a sensor, or the signal that
+    the loop's margins are measured with."""
     convert: bool = True
     """Convert units; false: ``factor`` and ``offset`` do it."""
 

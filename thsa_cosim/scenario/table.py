@@ -1,6 +1,6 @@
 """What all tables of a scenario file have in common."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -23,7 +23,7 @@ class Table(BaseModel):
         frozen=True,
         allow_inf_nan=False,
         regex_engine="python-re",
-        use_attribute_docstrings=True,  # what a key means stands below it; docs/scenario.md is made from that
+        defer_build=True,  # one kind of study needs the tables of one kind
     )
 
     @model_validator(mode="before")
@@ -39,6 +39,15 @@ class Table(BaseModel):
                         {"key": repr(key), "known": ", ".join(known), "hint": did_you_mean(key, known)},
                     )
         return data
+
+    @classmethod
+    def resolved(cls, table: "Table", **values: Any) -> Self:
+        """``table`` as it is used: ``values`` that were found (a path, a default of the FMU) win over its own.
+
+        Nothing is checked again; a subclass of a table declares only what it adds or narrows.
+        """
+        own = {name: getattr(table, name) for name in type(table).model_fields}
+        return cls.model_construct(**{**own, **values})
 
     @classmethod
     def keys(cls) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from thsa_cosim.errors import InputError, MissingExtraError, ScenarioError, UnitError, did_you_mean
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
+from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import check
 from thsa_cosim.scenario.schema import KINDS, SearchTable
 from thsa_cosim.scenario.sentences import from_validation, one_line
@@ -17,15 +18,26 @@ from thsa_cosim.scenario.source import Source, about_kind, read_source
 from thsa_cosim.scenario.system import open_model
 from thsa_cosim.scenario.tune_drawn import checked_line, checked_pareto, checked_surface
 from thsa_cosim.scenario.tune_model import (
+    PROFILE,
     Axis,
     CommandSpec,
     ControlCostSpec,
     LoopSpec,
+    Profile,
     Requirement,
     ScheduleSpec,
     TuneScenario,
 )
-from thsa_cosim.scenario.tune_schema import LOOP_METRICS, METRICS, ConditionTable, RequirementTable, TuneTable
+from thsa_cosim.scenario.tune_profile import finished, profile_axis, read_profiles, with_command
+from thsa_cosim.scenario.tune_schema import (
+    LOOP_METRICS,
+    METRICS,
+    START_METRICS,
+    ConditionTable,
+    RequirementTable,
+    StartTable,
+    TuneTable,
+)
 from thsa_cosim.scenario.tune_uncertainty import read_uncertainty
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import convert
@@ -64,9 +76,11 @@ def load_tune(source: Source, *, seed: int | None = None, fmu: Path | str | None
 
 
 def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription) -> TuneScenario:
-    command = _command(table, fmu)
+    profiles = _profiles(table, fmu, read_profiles(path, table, fmu))
+    command = profiles[0].command if profiles else _command(table, fmu)
     axes = tuple(_axis(name, axis, fmu, f"conditions.{name}") for name, axis in table.conditions.items())
-    driven = {command.input, *(axis.name for axis in axes)}
+    driven = {command.input, *(axis.name for axis in axes), *(table.profile.columns if table.profile else ())}
+    axes += profile_axis(len(profiles))
     for variable in fmu.inputs:
         if variable.is_float and variable.name not in driven and not variable.may_stay_open:
             raise ScenarioError(
@@ -88,7 +102,8 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         raise ScenarioError("simulation.step has no meaning here; the command has its own step.")
     if table.metrics.effort is not None:
         check.readable(fmu, table.metrics.effort, "metrics.effort")
-    if table.metrics.window[0] > command.time[-1]:
+    ends = min([command.time[-1], *(p.command.time[-1] for p in profiles)])
+    if table.metrics.window[0] > ends:
         raise ScenarioError("metrics.window begins after command.stop; move one of them.")
     if table.robust.combine == "worst" and any(axis.weights for axis in table.conditions.values()):
         raise ScenarioError("conditions: weights go with robust.combine = 'sum'; remove them or set it.")
@@ -108,7 +123,8 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         metrics=table.metrics,
         cost=_cost(table, command, fmu),
         requirements=requirements,
-        loop=_loop(table, command, fmu, space),
+        loop=_loop(table, float(ends), fmu, space),
+        start=_start(table, fmu),
         combine=table.robust.combine,
         uncertainty=read_uncertainty(path, table, axes, fmu),
         schedule=_schedule(table, axes, fmu),
@@ -117,15 +133,39 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         surface=checked_surface(table, space),
         search=SearchTable(method="differential-evolution", **table.search.model_dump(), polish=False),
         simulation=table.simulation,
+        profiles=profiles,
     )
+
+
+def _profiles(table: TuneTable, fmu: FmuDescription, recordings: Sequence[Recording]) -> tuple[Profile, ...]:
+    if table.command.shape != "recorded":
+        command = _command(table, fmu) if recordings else None
+        return tuple(with_command(recording, table, command) for recording in recordings)
+    source, follows = _command_variables(table, fmu)
+    factor = _factor(source, follows)
+    return finished([with_command(recording, table, None) for recording in recordings], factor)
+
+
+def _command_variables(table: TuneTable, fmu: FmuDescription) -> tuple[Variable, Variable]:
+    """The commanded input and the output that follows."""
+    source = check.find_variable(fmu, table.command.input, "command.input", fmu.inputs)
+    if source.causality != "input" or not source.is_float:
+        raise ScenarioError(f"command.input: {table.command.input!r} of {fmu.path.name} is no real input.")
+    return source, check.readable(fmu, table.command.output, "command.output")
+
+
+def _factor(source: Variable, follows: Variable) -> float:
+    """What turns the output's unit into the input's."""
+    try:
+        return convert(1.0, follows.unit, source.unit) if follows.unit and source.unit else 1.0
+    except UnitError as error:
+        raise UnitError(f"command: {error}") from None
 
 
 def _command(table: TuneTable, fmu: FmuDescription) -> CommandSpec:
     spec = table.command
-    source = check.find_variable(fmu, spec.input, "command.input", fmu.inputs)
-    if source.causality != "input" or not source.is_float:
-        raise ScenarioError(f"command.input: {spec.input!r} of {fmu.path.name} is no real input.")
-    follows = check.readable(fmu, spec.output, "command.output")
+    source, follows = _command_variables(table, fmu)
+    assert spec.stop is not None
     unit = spec.unit or source.unit or "1"
     time: FloatArray = spec.step * np.arange(round(spec.stop / spec.step) + 1, dtype=np.float64)
     begin = spec.begin
@@ -144,10 +184,9 @@ def _command(table: TuneTable, fmu: FmuDescription) -> CommandSpec:
         values = np.where(time >= begin - 1e-12, float(spec.final or 0.0), 0.0)
     try:
         values = convert(values, unit, source.unit or unit)
-        factor = convert(1.0, follows.unit, source.unit) if follows.unit and source.unit else 1.0
     except UnitError as error:
         raise UnitError(f"command: {error}") from None
-    return CommandSpec(spec.input, spec.output, unit, time, values, begin, factor)
+    return CommandSpec(spec.input, spec.output, unit, time, values, begin, _factor(source, follows))
 
 
 def _axis(name: str, table: ConditionTable, fmu: FmuDescription, key: str) -> Axis:
@@ -219,6 +258,12 @@ def _requirement(
         raise ScenarioError(
             f"{key}: {spec.metric} needs the table [loop] with the signal to open the loop at."
         )
+    if spec.metric in START_METRICS:
+        if table.start is None or spec.metric not in table.start.terms:
+            raise ScenarioError(
+                f"{key}: {spec.metric} needs the table [start] with current, voltage and their limits."
+            )
+        unit = unit or fmu.variables[table.start.current].unit or "1"
     if spec.metric == "effort":
         if table.metrics.effort is None:
             raise ScenarioError(f"{key}: effort needs metrics.effort, the signal that counts.")
@@ -257,15 +302,13 @@ def _cost(table: TuneTable, command: CommandSpec, fmu: FmuDescription) -> Contro
     )
 
 
-def _loop(
-    table: TuneTable, command: CommandSpec, fmu: FmuDescription, space: ParameterSpace
-) -> LoopSpec | None:
+def _loop(table: TuneTable, ends: float, fmu: FmuDescription, space: ParameterSpace) -> LoopSpec | None:
     if table.loop is None:
         return None
     check.readable(fmu, table.loop.signal, "loop.signal")
-    at = float(command.time[-1]) if table.loop.at is None else table.loop.at
-    if at > command.time[-1]:
-        raise ScenarioError("loop.at lies after command.stop; lower it.")
+    at = ends if table.loop.at is None else table.loop.at
+    if at > ends:
+        raise ScenarioError("loop.at lies after the end of the command; lower it.")
     if not fmu.supports_model_exchange:
         raise ScenarioError(
             f"[loop]: {fmu.path.name} has no Model Exchange, which linearising needs; export it with both or"
@@ -280,14 +323,23 @@ def _loop(
     if table.loop.margins == "python-control" and importlib.util.find_spec("control") is None:
         raise MissingExtraError("loop.margins = 'python-control'", "control")
     variables = tuple(space[name].variable for name in names)
-    return LoopSpec(table.loop.signal, at, variables, table.loop.margins)
+    return LoopSpec.resolved(table.loop, at=at, gains=variables)
+
+
+def _start(table: TuneTable, fmu: FmuDescription) -> StartTable | None:
+    if table.start is not None:
+        for key in ("current", "voltage"):
+            name = getattr(table.start, key)
+            if name is not None:
+                check.readable(fmu, name, f"start.{key}")
+    return table.start
 
 
 def _schedule(table: TuneTable, axes: Sequence[Axis], fmu: FmuDescription) -> ScheduleSpec | None:
     spec = table.schedule
     if spec is None:
         return None
-    known = [axis.name for axis in axes]
+    known = [axis.name for axis in axes if axis.name != PROFILE]
     for name in (*spec.over, *spec.check):
         if name not in known:
             raise ScenarioError(f"schedule: {name!r} is none of the [conditions].{did_you_mean(name, known)}")
@@ -298,6 +350,4 @@ def _schedule(table: TuneTable, axes: Sequence[Axis], fmu: FmuDescription) -> Sc
     if len(set(spec.over)) < len(spec.over):
         raise ScenarioError("schedule.over names a condition twice; remove one.")
     swept = {name: _axis(name, t, fmu, f"schedule.check.{name}") for name, t in spec.check.items()}
-    return ScheduleSpec(
-        tuple(spec.over), spec.smoothing, spec.reserve, tuple(swept.get(a.name, a) for a in axes)
-    )
+    return ScheduleSpec.resolved(spec, check=tuple(swept.get(a.name, a) for a in axes))

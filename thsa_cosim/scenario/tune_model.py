@@ -8,9 +8,19 @@ from typing import Literal
 
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.parameters import ParameterSpace
+from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario.schema import SearchTable, SimulationTable
-from thsa_cosim.scenario.tune_schema import LineTable, MetricsTable, ParetoTable, SurfaceTable, TuneTable
-from thsa_cosim.signals import FloatArray
+from thsa_cosim.scenario.tune_schema import (
+    LineTable,
+    LoopTable,
+    MetricsTable,
+    ParetoTable,
+    ScheduleTable,
+    StartTable,
+    SurfaceTable,
+    TuneTable,
+)
+from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.units import convert
 
 
@@ -28,13 +38,29 @@ class CommandSpec:
     values: FloatArray
     begin: float
     factor: float
+    ends_at_most: bool = True
+    """Whether the last value is the largest: a recorded profile that goes on has no rise, overshoot or settling."""
+
+
+PROFILE = "profile"
+"""The axis whose values are the numbers of the recorded profiles."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A recording that drives responses: ``inputs`` of the FMU in its units, without the command; its ``command``."""
+
+    recording: Recording
+    inputs: Signals
+    command: CommandSpec
 
 
 @dataclass(frozen=True)
 class Axis:
     """One condition's values in ``unit`` (as in the scenario) with their weights; the FMU's unit may differ.
 
-    ``is_input``: an input of the FMU that stays constant, else a parameter.
+    ``is_input``: an input of the FMU that stays constant, else a parameter. The axis :data:`PROFILE` is neither: it
+    numbers the recorded profiles from 1.
     """
 
     name: str
@@ -73,7 +99,7 @@ def combinations(axes: Sequence[Axis]) -> tuple[Condition, ...]:
         for axis, k in zip(axes, picks, strict=True):
             weight *= axis.weights[k]
         inputs = {a.name: a.to_fmu(shown[a.name]) for a in axes if a.is_input}
-        values = {a.name: a.to_fmu(shown[a.name]) for a in axes if not a.is_input}
+        values = {a.name: a.to_fmu(shown[a.name]) for a in axes if not a.is_input and a.name != PROFILE}
         conditions.append(Condition(shown, inputs, values, weight))
     return tuple(conditions)
 
@@ -112,18 +138,14 @@ class Requirement:
         return replace(self, limit=self.limit - (reserve if self.upper else -reserve) * abs(self.limit))
 
 
-@dataclass(frozen=True)
-class LoopSpec:
-    """The loop is opened at ``signal``; linearised with the response's state at ``at`` [s].
+class LoopSpec(LoopTable):
+    """``[loop]`` with its defaults: linearised with the response's state ``at`` [s].
 
-    ``gains`` are FMU parameters that act on the plant through that signal alone; ``margins`` says who reads
-    gain and phase margin off the loop's frequency response.
+    ``gains`` are FMU parameters that act on the plant through the signal alone.
     """
 
-    signal: str
     at: float
-    gains: tuple[str, ...]
-    margins: Literal["own", "python-control"] = "own"
+    gains: tuple[str, ...]  # type: ignore[assignment]
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,17 +172,10 @@ class UncertaintySpec:
     points: tuple[CovariancePoint, ...]
 
 
-@dataclass(frozen=True)
-class ScheduleSpec:
-    """Gains over the conditions ``over``; ``check`` holds the axes of the sweep.
+class ScheduleSpec(ScheduleTable):
+    """``[schedule]``, whose ``check`` holds the axes of the sweep."""
 
-    The nodes' own searches keep ``reserve`` (a share) away from the limits, which leaves room to smooth.
-    """
-
-    over: tuple[str, ...]
-    smoothing: float
-    reserve: float
-    check: tuple[Axis, ...]
+    check: tuple[Axis, ...]  # type: ignore[assignment]
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,6 +202,7 @@ class TuneScenario:
     cost: ControlCostSpec
     requirements: tuple[Requirement, ...]
     loop: LoopSpec | None
+    start: StartTable | None
     combine: Literal["worst", "sum"]
     uncertainty: UncertaintySpec | None
     schedule: ScheduleSpec | None
@@ -195,4 +211,14 @@ class TuneScenario:
     surface: SurfaceTable | None
     search: SearchTable
     simulation: SimulationTable
+    profiles: tuple[Profile, ...] = ()
     kind: str = "tune"
+
+    def profile_of(self, shown: Mapping[str, float]) -> Profile | None:
+        """The recorded profile of a condition's ``shown`` values, if it has one."""
+        return self.profiles[int(shown[PROFILE]) - 1] if PROFILE in shown else None
+
+    def command_of(self, shown: Mapping[str, float]) -> CommandSpec:
+        """The command under a condition: the profile's, or the scenario's."""
+        profile = self.profile_of(shown)
+        return self.command if profile is None else profile.command

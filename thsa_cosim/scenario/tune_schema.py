@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from thsa_cosim.scenario.recording_schema import ColumnTable, TimeTable
 from thsa_cosim.scenario.schema import EvolutionTable, SimulationTable
 from thsa_cosim.scenario.system_schema import ModelTable
 from thsa_cosim.scenario.table import Moderate, Name, NotNegative, Positive, Share, Table
@@ -22,8 +23,14 @@ METRICS = {
     "gain_margin": ("dB", 10.0),
     "phase_margin": ("deg", 10.0),
     "bandwidth": ("Hz", 10.0),
+    "start_time": ("s", 0.1),
+    "breakaway_current": ("", 1.0),
+    "breakaway_margin": ("1", 0.1),
+    "current_reserve": ("1", 0.1),
+    "voltage_reserve": ("1", 0.1),
 }
 LOOP_METRICS = ("gain_margin", "phase_margin", "bandwidth")
+START_METRICS = ("start_time", "breakaway_current", "breakaway_margin", "current_reserve", "voltage_reserve")
 TERMS = ("tracking", *METRICS)
 
 
@@ -36,8 +43,9 @@ class CommandTable(Table):
     """The FMU output that should follow."""
     unit: str | None = None
     """Of ``final``, ``rate`` and ``points``; left out: the input's."""
-    shape: Literal["ramp", "step", "points"]
-    """A ramp takes ``final`` and ``rate``, a step ``final``, ``"points"`` the ``points``."""
+    shape: Literal["ramp", "step", "points", "recorded"]
+    """A ramp takes ``final`` and ``rate``, a step ``final``, ``"points"`` the ``points``; ``"recorded"`` is the column
+    of ``[profile]``."""
     final: Moderate | None = None
     """Last value."""
     rate: Positive | None = None
@@ -46,21 +54,26 @@ class CommandTable(Table):
     """s, when a ramp or step begins."""
     points: list[list[float]] | None = None
     """Pairs ``[time in s, command]``, linear between them."""
-    stop: Positive
-    """s, the end."""
+    stop: Positive | None = None
+    """s, the end. Of a recorded command: no later than this; left out: the recording's end."""
     step: Positive = 0.001
     """s, communication step; the sum in equation 7 runs over these samples."""
 
     @model_validator(mode="after")
     def _complete(self) -> "CommandTable":
-        wanted = {"ramp": {"final", "rate"}, "step": {"final"}, "points": {"points"}}[self.shape]
+        shapes: dict[str, set[str]] = {"ramp": {"final", "rate"}, "step": {"final"}, "points": {"points"}}
+        wanted = shapes.get(self.shape, set())
         given = {key for key in ("final", "rate", "points") if getattr(self, key) is not None}
         if given != wanted:
             raise PydanticCustomError(
                 "shape",
                 "shape = '{shape}' takes {wanted} and nothing else of final, rate, points",
-                {"shape": self.shape, "wanted": " and ".join(sorted(wanted))},
+                {"shape": self.shape, "wanted": " and ".join(sorted(wanted)) or "none"},
             )
+        if self.stop is None:
+            if self.shape != "recorded":
+                raise PydanticCustomError("stop", "stop is missing; only shape = 'recorded' ends by itself")
+            return self
         if self.final == 0.0:
             raise PydanticCustomError("final", "final = 0 leaves nothing to rise to; use another number")
         if not 2 <= self.stop / self.step <= 1e7:
@@ -117,6 +130,19 @@ class ConditionTable(Table):
         if self.weights is not None and len(self.weights) != len(self.values or ()):
             raise PydanticCustomError("weights", "weights must be as many as values")
         return self
+
+
+class ProfileTable(Table):
+    """``[profile]``: recordings whose temperature, load or command drive every response, instead of constants.
+
+    Each recording is one condition, combined with ``[conditions]``; the gains must serve all of them.
+    """
+
+    recordings: list[Name] = Field(min_length=1)
+    """Files or globs."""
+    time: TimeTable = TimeTable()
+    columns: dict[Name, ColumnTable] = Field(min_length=1)
+    """By FMU input."""
 
 
 class GainTable(Table):
@@ -232,6 +258,43 @@ class LoopTable(Table):
     """``"python-control"`` has python-control read gain and phase margin (extra ``control``)."""
 
 
+class StartTable(Table):
+    """``[start]``: the start from rest after a soak, against what the drive can give.
+
+    It adds terms to every response: ``start_time`` (s from the start of the command until the output moves),
+    ``breakaway_current`` (the current at that moment), ``breakaway_margin`` (``current_limit`` over that current,
+    less one), ``current_reserve`` and ``voltage_reserve`` (1 − peak / limit). Breakaway current includes what
+    accelerates the motor; a slow ramp gives the static one.
+    """
+
+    moving: Annotated[float, Field(gt=0, lt=1)] = 0.02
+    """Share of its last value from which the output counts as moving."""
+    current: Name
+    """The motor's current."""
+    current_limit: Positive
+    """What the drive can give, in the signal's unit."""
+    voltage: Name | None = None
+    """The motor's voltage."""
+    voltage_limit: Positive | None = None
+    """What the drive can give, in the signal's unit."""
+
+    @model_validator(mode="after")
+    def _voltage(self) -> "StartTable":
+        if (self.voltage is None) != (self.voltage_limit is None):
+            raise PydanticCustomError("voltage", "voltage and voltage_limit go together; give both or none")
+        return self
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """What it reads besides the command's output."""
+        return tuple(name for name in (self.current, self.voltage) if name is not None)
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of its terms, in the order in which a response gives them."""
+        return START_METRICS if self.voltage is not None else START_METRICS[:-1]
+
+
 class RobustTable(Table):
     """``[robust]``: how the conditions of one set of gains become one number."""
 
@@ -312,6 +375,7 @@ class TuneTable(ModelTable):
     """
     command: CommandTable
     conditions: dict[Name, ConditionTable] = Field(default_factory=dict)
+    profile: ProfileTable | None = None
     parameters: list[GainTable] = Field(min_length=1)
     before: dict[Name, float] = Field(min_length=1)
     """A value of every parameter; the tuned values are compared with it."""
@@ -321,6 +385,7 @@ class TuneTable(ModelTable):
     cost: ControlCostTable
     requirements: list[RequirementTable] = Field(default_factory=list)
     loop: LoopTable | None = None
+    start: StartTable | None = None
     robust: RobustTable = RobustTable()
     uncertainty: UncertaintyTable | None = None
     schedule: ScheduleTable | None = None

@@ -13,8 +13,7 @@ from thsa_cosim.costs.channels import Channel
 from thsa_cosim.errors import ScenarioError
 from thsa_cosim.inverse_dynamics import low_pass
 from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario import Channel as ChannelSpec
-from thsa_cosim.scenario import Scenario
+from thsa_cosim.scenario import ChannelTable, Scenario
 from thsa_cosim.signals import FloatArray, Signals
 
 
@@ -94,7 +93,7 @@ def build_case(scenario: Scenario, recording: Recording, fixed: Mapping[str, flo
 
 
 def _channel(
-    scenario: Scenario, recording: Recording, name: str, spec: ChannelSpec, counted: np.ndarray[Any, Any]
+    scenario: Scenario, recording: Recording, name: str, spec: ChannelTable, counted: np.ndarray[Any, Any]
 ) -> Channel:
     """The samples of a channel that count; within a band every so many, so that they do not repeat each other."""
     time, measured, every = recording.signals.time, recording.signals[name], 1
@@ -131,7 +130,7 @@ def _channel(
 def _counted(scenario: Scenario, time: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Which samples (n,) count: inside the window, outside every masked span; s after the first sample."""
     elapsed = time - time[0]
-    counted = window_mask(elapsed, scenario.cost.start, scenario.cost.stop)
+    counted = window_mask(elapsed, scenario.cost.window.start, scenario.cost.window.stop)
     for begin, end in scenario.cost.mask:
         counted &= ~window_mask(elapsed, begin, end)
     return counted

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-import thsa_cosim.export
+import thsa_cosim
 from thsa_cosim import __version__
 from thsa_cosim.study.digest import digest_of_folder, digest_of_text
 from thsa_cosim.study.identity import MODELICA
@@ -23,7 +23,9 @@ def export_digest(source: str, package: Path, platforms: Sequence[str] | None) -
             tools[tool] = version(tool)
         except PackageNotFoundError:  # exporting will say so
             continue
-    exporter = digest_of_folder(Path(thsa_cosim.export.__file__).parent, ["*.py", "*.c", "*.h"])
+    # Not imported for that: only an export itself needs the exporter.
+    package_folder = Path(thsa_cosim.__file__).parent
+    exporter = digest_of_folder(package_folder / "export", ["*.py", "*.c", "*.h"])
     return digest_of_text(
         source, digest_of_folder(package, MODELICA), json.dumps([platforms, tools], sort_keys=True), exporter
     )

@@ -34,6 +34,7 @@ BY_CONTENT = {
     "components.fmu": "the digest of the system that is made of them",
     "recordings.fit": "digests of the samples that are used",
     "recordings.validate": "digests of the samples that are used",
+    "profile.recordings": "digests of the samples that are used",
     "parameter_set": "the start values that follow from it, per point",
     "uncertainty.result": "the covariances that were read from it",
     "diagnose.package": "the digest of the package's classes",
@@ -53,6 +54,8 @@ def study_identity(scenario: Scenario | TuneScenario, kind: str | None = None) -
     asked |= flatten(scenario.table)
     if isinstance(scenario, TuneScenario):
         asked |= {f"start values.{name}": value for name, value in scenario.fixed.items()}
+        for profile in scenario.profiles:
+            asked[f"profile.recordings[{profile.recording.name}]"] = digest_of_recording(profile.recording)
         if scenario.uncertainty is not None:
             asked["uncertainty.result"] = digest_of_text(repr(_plain(scenario.uncertainty)))
     else:

@@ -35,6 +35,7 @@ class Part:
     step: float | None = None
     delay: float = 0.0
     start: Mapping[str, float] = field(default_factory=dict)
+    jitter: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class Wire:
     factor: float = 1.0
     offset: float = 0.0
     convert: bool = True
+    disturbance: str = ""
 
 
 def assemble(
@@ -66,11 +68,14 @@ def assemble(
         step = part.step
         if step is None and execution == "coupled":
             step = fmu.default_experiment.step or _STEP
-        components.append(Component(part.name, fmu, source, execution, dict(part.start), step, part.delay))
+        components.append(
+            Component(part.name, fmu, source, execution, dict(part.start), step, part.delay, part.jitter)
+        )
 
     by_name = {component.name: component.fmu for component in components}
     links = [
-        Connection(_pin(w.source, names), _pin(w.target, names), w.factor, w.offset, w.convert) for w in wires
+        Connection(_pin(w.source, names), _pin(w.target, names), w.factor, w.offset, w.convert, w.disturbance)
+        for w in wires
     ]
     outside = [
         _connector(shown, [_pin(pin, names) for pin in pins], by_name) for shown, pins in connectors.items()

@@ -8,6 +8,9 @@ from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription, Variab
 from thsa_cosim.system.order import stages
 from thsa_cosim.system.structure import System, connected_inputs, qualified
 
+DISTURBANCE = ""
+"""In place of a component, in the pin of an input that is added to a connection's target."""
+
 
 @dataclass(frozen=True)
 class SystemDescription(FmuDescription):
@@ -50,6 +53,17 @@ def describe_system(
             maximum=None,
         )
         add(connector.name, shown, connector.pins)
+    for connection in system.connections:
+        if connection.disturbance:
+            shown = replace(
+                system.variable(connection.target),
+                causality="input",
+                description=f"added to {'.'.join(connection.target)}",
+                start=0.0,
+                minimum=None,
+                maximum=None,
+            )
+            add(connection.disturbance, shown, (((DISTURBANCE, ".".join(connection.target)), 1.0, 0.0),))
     for component in system.components:
         for variable in component.fmu.variables.values():
             pin = (component.name, variable.name)

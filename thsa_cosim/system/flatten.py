@@ -55,6 +55,7 @@ class Link:
     factor: float = 1.0
     offset: float = 0.0
     suppress_units: bool = False
+    disturbance: str = ""
 
     def __str__(self) -> str:
         start = f"{self.start_element}.{self.start}" if self.start_element else self.start
@@ -73,6 +74,7 @@ class Element:
     execution: str = ""
     step: float | None = None
     delay: float = 0.0
+    jitter: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,7 @@ class _Way:
     factor: float
     offset: float
     convert: bool
+    disturbance: str = ""
 
 
 def flattened(nested: Nested) -> System:
@@ -128,7 +131,9 @@ def flattened(nested: Nested) -> System:
         way = _origin(end, into, names)
         if way.start.path in names:
             source, target = (way.start.path, way.start.name), (end.path, end.name)
-            connections.append(Connection(source, target, way.factor, way.offset, way.convert))
+            connections.append(
+                Connection(source, target, way.factor, way.offset, way.convert, way.disturbance)
+            )
         elif way.start.path == "":
             inputs.setdefault(way.start.name, []).append(way)
         else:
@@ -161,7 +166,14 @@ def _components(nested: Nested, path: str) -> Iterator[Component]:
             yield from _components(element, f"{name}.")
             continue
         yield Component(
-            name, element.fmu, element.source, _execution(element), {}, _step(element), element.delay
+            name,
+            element.fmu,
+            element.source,
+            _execution(element),
+            {},
+            _step(element),
+            element.delay,
+            element.jitter,
         )
 
 
@@ -200,7 +212,7 @@ def _links(nested: Nested, path: str) -> Iterator[_Way]:
                     f"connection {link}: there is no connector {connector!r}.{did_you_mean(connector, known)}"
                 )
             ends.append(_Node(f"{path}{name}" if name else path.rstrip("."), connector))
-        yield _Way(ends[0], ends[1], link.factor, link.offset, not link.suppress_units)
+        yield _Way(ends[0], ends[1], link.factor, link.offset, not link.suppress_units, link.disturbance)
     for element in nested.elements:
         if isinstance(element, Nested):
             yield from _links(element, f"{path}{element.name}.")
@@ -209,6 +221,7 @@ def _links(nested: Nested, path: str) -> Iterator[_Way]:
 def _origin(end: _Node, into: Mapping[_Node, list[_Way]], names: set[str]) -> _Way:
     """Follow connectors of nested systems back to a component's output or a connector of the whole."""
     node, factor, offset, convert = end, 1.0, 0.0, True
+    disturbance = into[end][0].disturbance if end in into else ""
     seen = {end}
     while node in into:
         way = into[node][0]
@@ -221,7 +234,7 @@ def _origin(end: _Node, into: Mapping[_Node, list[_Way]], names: set[str]) -> _W
                 f"the connectors {node.path}.{node.name} and others feed each other in a circle; cut it."
             )
         seen.add(node)
-    return _Way(node, end, factor, offset, convert)
+    return _Way(node, end, factor, offset, convert, disturbance)
 
 
 def _starts(

@@ -21,7 +21,7 @@ from thsa_cosim.fmu.instance import Channel, EventInfo, Instance
 from thsa_cosim.fmu.native import Messages, MessageSink
 from thsa_cosim.fmu.point import Point
 from thsa_cosim.signals import FloatArray
-from thsa_cosim.system.description import SystemDescription
+from thsa_cosim.system.description import DISTURBANCE, SystemDescription
 from thsa_cosim.system.stepped import Stepped
 from thsa_cosim.system.structure import Component
 from thsa_cosim.system.wiring import Port, Wiring
@@ -62,6 +62,7 @@ class SystemInstance(Instance):
         self._time = 0.0
         self._names = list(description.variables)
         self._ports: dict[tuple[str, str], Port] = {}
+        self._disturbed = {".".join(pin): k for k, pin in enumerate(self._wiring.targets)}
 
     def _driven(self, name: str) -> list[str]:
         """Inputs of a stepped component that come from outside the system."""
@@ -136,6 +137,8 @@ class SystemInstance(Instance):
             return []
         for variable in variables:
             for (name, own), *_ in self._pins[variable.name]:
+                if name == DISTURBANCE:
+                    continue
                 self.parts[name].channels([self.parts[name].description.variable(own)])  # a number?
         references = np.array([v.value_reference for v in variables], dtype=np.uint32)
         return [Channel("System", references, np.dtype(np.float64), tuple(range(len(variables))))]
@@ -154,7 +157,10 @@ class SystemInstance(Instance):
                 name = self._name(reference)
                 (part, own), factor, offset = self._pins[name][0]
                 value = np.empty(1)
-                self._port(part, own).read(value)
+                if part == DISTURBANCE:
+                    value[0] = self._wiring.disturbance[self._disturbed[own]]
+                else:
+                    self._port(part, own).read(value)
                 is_input = self.description.variables[name].causality == "input"
                 out[column] = (value[0] - offset) / factor if is_input else factor * value[0] + offset
 
@@ -168,6 +174,9 @@ class SystemInstance(Instance):
         return self._ports[key]
 
     def _set(self, part: str, variable: str, value: float) -> None:
+        if part == DISTURBANCE:
+            self._wiring.disturbance[self._disturbed[variable]] = value
+            return
         for stepped in self._stepped:
             if stepped.component.name == part and stepped.drive(variable, value):
                 return

@@ -1,9 +1,10 @@
 """SSP archives: read into a :class:`System`, and written.
 
 Source: Modelica Association, *System Structure and Parameterization* 1.0 (2019) and 2.0 (2024). Read: nested systems,
-connectors, connections with linear transformations, parameter bindings (inline or a resource, with parameter mapping),
-FMUs as resources or from another place relative to the archive. How a component goes on (its step, delay, and whether
-it is sampled) is no part of SSP: it stands in an annotation of the type ``thsa-cosim``, which other tools skip.
+connectors of all numeric types, connections with linear transformations, parameter bindings (inline or a resource, with
+parameter mapping), FMUs as resources or from another place relative to the archive. How a component goes on (its step,
+delay, and whether it is sampled) is no part of SSP: it stands in an annotation of the type ``thsa-cosim``, which other
+tools skip.
 """
 
 import posixpath
@@ -16,7 +17,7 @@ from pathlib import Path
 from thsa_cosim.errors import FmuError, InputError, ParameterError
 from thsa_cosim.fmu.archive import check_archive, open_archive
 from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription, read_description
-from thsa_cosim.ssv import SSV, parse_ssv
+from thsa_cosim.ssv import FLOATS, SSV, parse_ssv
 from thsa_cosim.system.flatten import Binding, Element, Link, Nested, flattened
 from thsa_cosim.system.structure import System
 
@@ -28,6 +29,7 @@ ANNOTATION = "thsa-cosim"
 _LARGEST = 64 * 2**20
 """No XML file of an SSP may be larger [bytes]."""
 _FMU_TYPES = ("", "application/x-fmu-sharedlibrary")
+_IMPLEMENTATIONS = {"any": "", "ModelExchange": "continuous", "CoSimulation": "coupled"}
 
 
 @dataclass(frozen=True)
@@ -190,34 +192,55 @@ def _component(
         return Nested(name, inner.elements, inner.links, inner.connectors, (*inner.bindings, *bindings))
     if source not in fmus:
         raise FmuError(f"{path} holds no {source}, which component {name!r} names; add it to the archive.")
-    how = next(
-        (
-            a
-            for a in element.iterfind(f"{{{SSD}}}Annotations/{{{SSC}}}Annotation")
-            if a.get("type") == ANNOTATION
-        ),
-        None,
-    )
-    run = None if how is None else how.find("Execution")
-    given: Mapping[str, str] = {} if run is None else run.attrib
+    given = _own(element, "Execution")
     return Element(
         name=name,
         fmu=fmus[source],
         source=source,
         bindings=bindings,
-        execution=given.get("kind", ""),
+        execution=given.get("kind") or _implementation(path, element),
         step=_float(given.get("step")),
         delay=_float(given.get("delay")) or 0.0,
+        jitter=_float(given.get("jitter")) or 0.0,
     )
+
+
+def _own(element: ET.Element, tag: str) -> Mapping[str, str]:
+    """Attributes of what our annotation of an element says under ``tag``."""
+    for annotation in element.iterfind(f"{{{SSD}}}Annotations/{{{SSC}}}Annotation"):
+        found = annotation.find(tag) if annotation.get("type") == ANNOTATION else None
+        if found is not None:
+            return found.attrib
+    return {}
+
+
+def _implementation(path: Path, element: ET.Element) -> str:
+    """How the archive asks for a component to be run, in our words; "" leaves it to us (SSP 1.0, section 5.4.2)."""
+    asked = element.get("implementation", "any")
+    if asked not in _IMPLEMENTATIONS:
+        raise FmuError(
+            f"{path}: component {element.get('name', '')!r} asks for {asked!r}; "
+            f"supported are {', '.join(_IMPLEMENTATIONS)}."
+        )
+    return _IMPLEMENTATIONS[asked]
 
 
 def _connectors(element: ET.Element) -> Mapping[str, tuple[str, str]]:
     """Kind and unit of each connector."""
     found = {}
     for connector in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector"):
-        typed = next(iter(connector.iterfind(f"{{{SSC}}}Real")), None)
+        name = connector.get("name", "")
+        if next(connector.iter(f"{{{SSC}}}Dimension"), None) is not None:
+            raise FmuError(
+                f"connector {name!r} is an array (SSP 2.0), which is not supported; connect its elements."
+            )
+        if connector.find(f"{{{SSC}}}Clock") is not None:
+            raise FmuError(
+                f"connector {name!r} is a clock (SSP 2.0), which is not supported; give a step instead."
+            )
+        typed = next((e for k in FLOATS for e in connector.iterfind(f"{{{SSC}}}{k}")), None)
         unit = "" if typed is None else typed.get("unit", "")
-        found[connector.get("name", "")] = (connector.get("kind", ""), unit)
+        found[name] = (connector.get("kind", ""), unit)
     return found
 
 
@@ -232,6 +255,7 @@ def _link(connection: ET.Element) -> Link:
         factor,
         offset,
         connection.get("suppressUnitConversion") in ("true", "1"),
+        _own(connection, "Disturbance").get("name", ""),
     )
 
 

@@ -3,9 +3,11 @@
 ``coupled``: at t_k+1 the component steps from t_k with the mean of its inputs at both ends (second order in the step,
 as in ``thsa_cosim.fmu.inputs``); between its steps the others see its outputs extrapolated linearly, which again is of
 second order. ``sampled``: at its tick t_k a controller takes its inputs as they are, and its outputs change at once
-(or ``delay`` later) and are held; so a continuous PI that is exported as Co-Simulation becomes its sampled form.
+(or ``delay`` later) and are held; so a continuous PI that is exported as Co-Simulation becomes its sampled form. Ticks
+may be late (``jitter``); the controller goes on in its nominal step all the same, as one with a fixed gain does.
 """
 
+import zlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -53,6 +55,8 @@ class Stepped:
         self._now = np.zeros(len(self._sources))
         self._slope = np.zeros(len(self._sources))
         self._waiting: tuple[float, FloatArray] | None = None
+        self._late = np.random.default_rng(0)
+        self._tick = 0.0
 
     def begin(self, time: float) -> None:
         """Take the state after initialisation."""
@@ -60,6 +64,8 @@ class Stepped:
         self._ticks = 0 if self.component.execution == "sampled" else 1
         self._waiting = None
         self._slope[:] = 0.0
+        self._late = np.random.default_rng(zlib.crc32(self.component.name.encode()))
+        self._tick = self._next_tick()
         self._now = self._read()
         self._before = self._present()
 
@@ -70,8 +76,12 @@ class Stepped:
     @property
     def next_time(self) -> float:
         """When it acts next [s]."""
-        tick = self._start + self._ticks * self._step
-        return min(tick, self._waiting[0]) if self._waiting is not None else tick
+        return min(self._tick, self._waiting[0]) if self._waiting is not None else self._tick
+
+    def _next_tick(self) -> float:
+        """When the tick of the present number comes: as due, or late."""
+        due = self._start + self._ticks * self._step
+        return due + self.component.jitter * self._late.random() if self.component.jitter else due
 
     def act(self, time: float) -> bool:
         """Do what is due at ``time``; return whether its outputs may have changed."""
@@ -79,8 +89,9 @@ class Stepped:
             return False
         if self._waiting is not None and time >= self._waiting[0] - _TIME * self._step:
             self._now, self._waiting = self._waiting[1], None
-        if time >= self._start + self._ticks * self._step - _TIME * self._step:
+        if time >= self._tick - _TIME * self._step:
             (self._sample if self.component.execution == "sampled" else self._follow)(time)
+            self._tick = self._next_tick()
         return True
 
     def _sample(self, time: float) -> None:

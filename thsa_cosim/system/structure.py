@@ -33,11 +33,13 @@ class Component:
     """Communication step or sampling interval [s]; None for ``continuous``."""
     delay: float = 0.0
     """Time from a tick until a sampled component's outputs change [s], at most one ``step``."""
+    jitter: float = 0.0
+    """A sampled component's ticks are late by up to so much [s], uniformly distributed; the same in every run."""
 
 
 @dataclass(frozen=True)
 class Connection:
-    """``target = factor * source + offset``; both are (component, variable)."""
+    """``target = factor * source + offset (+ disturbance)``; both are (component, variable)."""
 
     source: tuple[str, str]
     target: tuple[str, str]
@@ -45,6 +47,8 @@ class Connection:
     offset: float = 0.0
     convert: bool = True
     """Whether units are still to be converted; False: factor and offset do it."""
+    disturbance: str = ""
+    """Name of an input of the system that is added to ``target``, in its unit; "" for none."""
 
     def __str__(self) -> str:
         return f"{'.'.join(self.source)} -> {'.'.join(self.target)}"
@@ -146,10 +150,23 @@ def checked(system: System) -> System:
                 connection.factor * factor,
                 factor * connection.offset + offset,
                 convert=False,
+                disturbance=_disturbance(connection, target),
             )
         )
+    _unique(
+        [*(c.disturbance for c in connections if c.disturbance), *(c.name for c in system.connectors)],
+        "input",
+    )
     connectors = tuple(_checked_connector(system, c, writers) for c in system.connectors)
     return System(system.name, system.components, tuple(connections), connectors)
+
+
+def _disturbance(connection: Connection, target: Variable) -> str:
+    if connection.disturbance and not target.is_float:
+        raise FmuError(
+            f"connection {connection}: a disturbance cannot be added to a {target.type}; leave it out."
+        )
+    return connection.disturbance
 
 
 def _unique(names: Sequence[str], what: str) -> None:
@@ -214,12 +231,13 @@ def _check_component(component: Component) -> None:
         raise FmuError(f"component {name!r}: {fmu.path.name} has no Co-Simulation; leave its step out.")
     if component.step is None or not component.step > 0.0:
         raise FmuError(f"component {name!r} runs by Co-Simulation: give it a positive step in s.")
-    if not 0.0 <= component.delay <= component.step:
-        raise FmuError(
-            f"component {name!r}: the delay of {component.delay:g} s exceeds its step of {component.step:g} s."
+    if not 0.0 <= component.delay + component.jitter <= component.step:
+        late = f"{component.delay:g} s" + (
+            f" and the jitter of {component.jitter:g} s" if component.jitter else ""
         )
-    if component.delay and component.execution != "sampled":
-        raise FmuError(f"component {name!r}: only a sampled component has a delay.")
+        raise FmuError(f"component {name!r}: the delay of {late} exceeds its step of {component.step:g} s.")
+    if (component.delay or component.jitter) and component.execution != "sampled":
+        raise FmuError(f"component {name!r}: only a sampled component has a delay or jitter.")
 
 
 def default_execution(fmu: FmuDescription, step: float | None) -> Execution:

@@ -49,6 +49,8 @@ class Wiring:
         """Which source each target takes."""
         self.factor = np.array([c.factor for c in system.connections])
         self.offset = np.array([c.offset for c in system.connections])
+        self.disturbance = np.zeros(len(self.targets))
+        """What is added to each target, in its unit."""
         self._stages = [
             (stage.is_loop, self._reads(stage.sources), *self._writes(stage.sources), stage.sources)
             for stage in stages(system)
@@ -89,7 +91,7 @@ class Wiring:
 
     def inputs(self) -> FloatArray:
         """Values (m,) of the targets that follow from ``values``."""
-        return np.asarray(self.factor * self.values[self.feeds] + self.offset)
+        return np.asarray(self.factor * self.values[self.feeds] + self.offset + self.disturbance)
 
     def propagate(self, time: float, *, events: bool = False) -> None:
         """Read and write everything in order; with ``events`` discrete inputs too (Event or Initialization Mode)."""

@@ -58,7 +58,7 @@ def _structure(system: System, experiment: DefaultExperiment) -> bytes:
     for connection in system.connections:
         start = dict(zip(("Element", "Connector"), connection.source, strict=True))
         end = dict(zip(("Element", "Connector"), connection.target, strict=True))
-        _link(links, start, end, connection.factor, connection.offset)
+        _link(links, start, end, connection.factor, connection.offset, connection.disturbance)
     if experiment.stop is not None:
         _sub(
             root,
@@ -118,20 +118,34 @@ def _component(parent: ET.Element, component: Component) -> None:
                 _sub(number, SSV, "Real", value=repr(float(value)))
             else:
                 _sub(number, SSV, "Integer", value=str(round(value)))
-    annotation = _sub(_sub(element, SSD, "Annotations"), SSC, "Annotation", type=ANNOTATION)
     how: dict[str, str] = {"kind": component.execution}
     if component.step is not None:
         how["step"] = repr(component.step)
     if component.delay:
         how["delay"] = repr(component.delay)
-    ET.SubElement(annotation, "Execution", how)
+    if component.jitter:
+        how["jitter"] = repr(component.jitter)
+    _annotate(element, "Execution", how)
+
+
+def _annotate(element: ET.Element, tag: str, attributes: dict[str, str]) -> None:
+    """Say in an annotation what SSP has no words for; other tools skip it."""
+    annotation = _sub(_sub(element, SSD, "Annotations"), SSC, "Annotation", type=ANNOTATION)
+    ET.SubElement(annotation, tag, attributes)
 
 
 def _link(
-    parent: ET.Element, start: Mapping[str, str], end: Mapping[str, str], factor: float, offset: float
+    parent: ET.Element,
+    start: Mapping[str, str],
+    end: Mapping[str, str],
+    factor: float,
+    offset: float,
+    disturbance: str = "",
 ) -> None:
     attributes = {f"start{k}": v for k, v in start.items()} | {f"end{k}": v for k, v in end.items()}
     element = _sub(parent, SSD, "Connection", **attributes)
     element.set("suppressUnitConversion", "true")  # the factor holds it already
     if factor != 1.0 or offset != 0.0:
         _sub(element, SSC, "LinearTransformation", factor=repr(factor), offset=repr(offset))
+    if disturbance:
+        _annotate(element, "Disturbance", {"name": disturbance})

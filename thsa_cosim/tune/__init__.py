@@ -13,17 +13,21 @@
 ``results``     what comes out
 """
 
-from thsa_cosim.tune.results import (
-    GroupResult,
-    Pareto,
-    ScheduleCheck,
-    ScheduleResult,
-    Scored,
-    Surface,
-    TuneResult,
-)
-from thsa_cosim.tune.run import tune
-from thsa_cosim.tune.schedule import GainSchedule
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from thsa_cosim.tune.results import (
+        GroupResult,
+        Pareto,
+        ScheduleCheck,
+        ScheduleResult,
+        Scored,
+        Surface,
+        TuneResult,
+    )
+    from thsa_cosim.tune.run import tune
+    from thsa_cosim.tune.schedule import GainSchedule
 
 __all__ = [
     "GainSchedule",
@@ -36,3 +40,11 @@ __all__ = [
     "TuneResult",
     "tune",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name of this room when it is first asked for: a worker needs ``response`` alone."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    room = {"tune": "run", "GainSchedule": "schedule"}.get(name, "results")
+    return getattr(import_module(f"{__name__}.{room}"), name)

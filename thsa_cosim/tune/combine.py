@@ -18,7 +18,7 @@ INFEASIBLE = 1e9
 #: Excess of a metric that does not exist (a level never reached, a band never kept).
 UNDEFINED = 100.0
 #: Terms of which less is worse.
-SMALLEST = ("gain_margin", "phase_margin")
+SMALLEST = ("gain_margin", "phase_margin", "breakaway_margin", "current_reserve", "voltage_reserve")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +37,18 @@ class Combined:
 
 
 def equation_7(scenario: TuneScenario, names: Sequence[str], terms: FloatArray) -> FloatArray:
-    """J = Σ ½ (v - v̂)² + κ1 t_r + κ2 |e_ss| (c,) from terms (c, q); NaN where a term is undefined."""
+    """J = Σ ½ (v - v̂)² + κ1 t_r + κ2 |e_ss| (c,) from terms (c, q); NaN where a term that counts is undefined."""
     cost = scenario.cost
     tracking, rise, steady = (
         terms[:, names.index(n)] for n in ("tracking", "rise_time", "steady_state_error")
     )
     size = steady if cost.signed else np.abs(steady)
-    return np.asarray(tracking + cost.kappa_rise * rise + cost.kappa_steady * size)
+    total = tracking.copy()
+    # A recorded profile may end at rest: it has no rise and no steady state, and no weight on them.
+    for weight, term in ((cost.kappa_rise, rise), (cost.kappa_steady, size)):
+        if weight > 0.0:
+            total = total + weight * term
+    return np.asarray(total)
 
 
 def worst_of(names: Sequence[str], terms: FloatArray) -> FloatArray:

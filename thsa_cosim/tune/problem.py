@@ -109,11 +109,15 @@ def build_cases(
 def _case(
     scenario: TuneScenario, condition: Condition, number: int, shifts: Mapping[str, float]
 ) -> SampledCondition:
-    command, fmu = scenario.command, scenario.fmu
+    command, fmu = scenario.command_of(condition.shown), scenario.fmu
     fixed = {**scenario.fixed, **condition.values, **shifts}
-    reduce = reducer(scenario, condition.inputs, fixed)
     columns = {command.input: command.values}
     columns |= {name: np.full(command.time.shape, value) for name, value in condition.inputs.items()}
+    inputs = Signals(command.time, columns)
+    if (profile := scenario.profile_of(condition.shown)) is not None:
+        recorded = profile.inputs.resample(command.time)
+        inputs = Signals(command.time, {**columns, **recorded.values}, held=recorded.held)
+    reduce = reducer(scenario, inputs, fixed, command)
     label = condition.label or "response"
     return SampledCondition(
         condition,
@@ -121,7 +125,7 @@ def _case(
         Experiment(
             name=f"{label} sample {number}" if number else label,
             fmu=fmu.path,
-            inputs=Signals(command.time, columns),
+            inputs=inputs,
             outputs=reduce.recorded,
             time=command.time,
             fixed=fixed,

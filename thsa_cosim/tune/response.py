@@ -4,6 +4,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +12,14 @@ from thsa_cosim.costs import control_cost, settling_time
 from thsa_cosim.fmu import FmuDescription, SimulationFailure
 from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.linear import open_loop, state_names
-from thsa_cosim.scenario import TuneScenario
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.tune.margins import Margins, margins
+from thsa_cosim.tune.start import start_terms
+
+if TYPE_CHECKING:  # workers import this module
+    from thsa_cosim.scenario import TuneScenario
+    from thsa_cosim.scenario.tune_model import CommandSpec
+    from thsa_cosim.scenario.tune_schema import StartTable
 
 
 @dataclass(frozen=True)
@@ -26,7 +32,7 @@ class Terms:
     with_loop: bool
 
     @classmethod
-    def of(cls, scenario: TuneScenario) -> "Terms":
+    def of(cls, scenario: "TuneScenario") -> "Terms":
         """The terms that a scenario asks for."""
         peaks = tuple(dict.fromkeys(r.signal for r in scenario.requirements if r.signal))
         names = [
@@ -39,6 +45,7 @@ class Terms:
         ]
         names += ["effort"] if scenario.metrics.effort else []
         names += [f"peak.{signal}" for signal in peaks]
+        names += scenario.start.terms if scenario.start else ()
         names += ["gain_margin", "phase_margin", "bandwidth"] if scenario.loop else []
         return cls(tuple(names), peaks, scenario.metrics.effort, scenario.loop is not None)
 
@@ -103,6 +110,7 @@ class ResponseReducer:
     terms: Terms
     output: str
     command: FloatArray
+    ends_at_most: bool
     begin: float
     factor: float
     scale: float
@@ -110,12 +118,14 @@ class ResponseReducer:
     low: float | None
     window: tuple[float, float]
     settling_band: float
+    start: "StartTable | None"
     loop: LoopTask | None
 
     @property
     def recorded(self) -> tuple[str, ...]:
         """Variables that the simulation must record."""
         own = (self.output, *((self.terms.effort,) if self.terms.effort else ()), *self.terms.peaks)
+        own = (*own, *(self.start.signals if self.start else ()))
         return tuple(dict.fromkeys((*own, *(self.loop.recorded if self.loop else ()))))
 
     def __call__(self, signals: Signals) -> FloatArray:
@@ -134,17 +144,20 @@ class ResponseReducer:
             scale=self.scale,
         )
         final = float(self.command[-1])
+        settled = settling_time(time, response, final, self.settling_band, start=self.begin)
+        of_the_end = (cost.rise_time, cost.overshoot, settled) if self.ends_at_most else (np.nan,) * 3
         found = [
             cost.tracking,
-            cost.rise_time,
+            of_the_end[0],
             cost.steady_state_error,
-            cost.overshoot,
-            settling_time(time, response, final, self.settling_band, start=self.begin),
+            *of_the_end[1:],
             float(np.max(np.abs(self.command - response))) / self.scale,
         ]
         if self.terms.effort is not None:
             found.append(float(np.sqrt(np.mean(signals[self.terms.effort] ** 2))))
         found += [float(np.max(np.abs(signals[name]))) for name in self.terms.peaks]
+        if self.start is not None:
+            found += start_terms(self.start, signals, self.output, self.begin)
         if self.loop is not None:
             m = self.loop(signals, self.command)
             found += [m.gain_margin, m.phase_margin, m.bandwidth]
@@ -152,15 +165,16 @@ class ResponseReducer:
 
 
 def reducer(
-    scenario: TuneScenario, inputs: Mapping[str, float], fixed: Mapping[str, float]
+    scenario: "TuneScenario", inputs: Signals, fixed: Mapping[str, float], command: "CommandSpec"
 ) -> ResponseReducer:
-    """The reducer of one condition: its constant ``inputs`` and ``fixed`` start values, in the FMU's units."""
-    command, metrics = scenario.command, scenario.metrics
-    loop = scenario.loop
+    """The reducer of one condition: its ``inputs``, its ``command`` and ``fixed`` start values, in the FMU's units."""
+    metrics, loop = scenario.metrics, scenario.loop
+    others = [name for name in inputs.names if name != command.input]
     return ResponseReducer(
         terms=Terms.of(scenario),
         output=command.output,
         command=command.values,
+        ends_at_most=command.ends_at_most,
         begin=command.begin,
         factor=command.factor,
         scale=scenario.cost.scale,
@@ -168,13 +182,14 @@ def reducer(
         low=metrics.low if metrics.rise == "between" else None,
         window=(metrics.window[0], metrics.window[1]),
         settling_band=metrics.settling_band,
+        start=scenario.start,
         loop=None
         if loop is None
         else LoopTask(
             # A worker has a working directory of its own.
             replace(scenario.fmu, path=scenario.fmu.path.resolve()),
             fixed,
-            inputs,
+            {name: float(np.interp(loop.at, inputs.time, inputs[name])) for name in others},
             command.input,
             tuple(p.variable for p in scenario.parameters.parameters),
             loop.gains,

@@ -80,6 +80,20 @@ def test_two_effects_are_found_one_after_the_other():
     assert diagnosed(both, most=1).accepted[1:] == ()
 
 
+def test_forms_of_one_effect_in_one_place_are_not_mixed():
+    """Friction that runs in over distance or over time: one of them is the answer, and the other no second effect."""
+    true = {"motorEffect.frictionRunIn.dF": 1.0, "motorEffect.frictionRunIn.d_r": 60.0, **WINDAGE}
+    found = diagnosed(true, "friction-run-in", "windage")
+    assert sorted(s.candidate.name for s in found.accepted) == ["friction-run-in:motor", "windage:motor"]
+    run_in = next(s for s in found.accepted if s.candidate.effect.name == "friction-run-in")
+    assert run_in.candidate.variant.block == "FrictionRunIn"
+    offered = [{p.candidate.variant.block for p in r.proposals} for r in found.rounds]
+    assert offered[0] == {"FrictionRunIn", "FrictionRunInTime", "Windage"}
+    accepted = [r.accepted for r in found.rounds]
+    for later in offered[accepted.index(run_in) + 1 :]:
+        assert later <= {"Windage"}
+
+
 def test_a_second_effect_that_is_small_beside_the_first_is_found_where_it_explains_all_that_is_left():
     found = diagnosed({**WINDAGE, **STRIBECK})
     assert [s.candidate.effect.name for s in found.accepted] == ["stribeck", "windage"]

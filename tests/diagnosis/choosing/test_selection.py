@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from thsa_cosim.diagnosis.choosing import selection as room
-from thsa_cosim.diagnosis.choosing.selection import Selection, other_places, worth_refining
+from thsa_cosim.diagnosis.choosing.selection import Selection, other_places, other_waves, worth_refining
 
 
 def proposal(effect: str, gain: float, place: str = "motor") -> Any:
@@ -39,6 +39,19 @@ def test_other_places_are_those_of_the_same_effect_that_promise_nearly_as_much()
     proposals = [winner, again, proposal("b", 99.0, "gear"), gear, nut, proposal("a", 98.0)]
     assert other_places(winner, proposals) == [again]
     assert other_places(winner, [gear, nut]) == [gear]
+
+
+def test_ripples_at_other_wave_numbers_are_those_that_promise_a_tenth_of_the_best():
+    def ripple(gain: float, scanned: bool = True) -> Any:
+        own = proposal("cogging", gain)
+        own.candidate.shapes = (SimpleNamespace(scanned=scanned, fixed=False),)
+        return own
+
+    made = [ripple(100.0), ripple(90.0), ripple(80.0, scanned=False), ripple(10.0), ripple(9.9)]
+    refined: Any = [SimpleNamespace(proposal=made[1])]
+    assert other_waves(made, refined) == [made[0], made[3]]
+    assert other_waves([], refined) == []
+    assert len(other_waves([ripple(100.0 - k) for k in range(20)], [])) == room.WAVES
 
 
 N = 4000

@@ -134,6 +134,22 @@ def test_a_failed_simulation_only_costs_its_profile(monkeypatch: pytest.MonkeyPa
     assert without.distance <= whole.distance
 
 
+def test_a_tie_of_a_later_effect_is_separated_rather_than_the_first_one_from_its_runner_up(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    first, runner_up = (scored(n, k, np.zeros(TIME.size)) for n, k in (("backlash", 1.0), ("cogging", 1.0)))
+    winner, rival = scored("windage", 1.0, np.zeros(TIME.size)), scored("stribeck", 2.0, np.ones(TIME.size))
+    rounds = (
+        SimpleNamespace(accepted=first, scored=(first, runner_up), rivals=(), factors=np.ones(1)),
+        SimpleNamespace(accepted=winner, scored=(winner, rival), rivals=(rival,), factors=np.full(1, 2.0)),
+    )
+    best = find(monkeypatch, loaded, found=SimpleNamespace(rounds=rounds, accepted=(first, winner)))
+    assert best.rivals == ("windage", "stribeck")
+    assert best.present == pytest.approx(0.25 * best.inputs.time.size), "by the factors of its own round"
+    dropped = SimpleNamespace(rounds=rounds, accepted=(first,))
+    assert find(monkeypatch, loaded, found=dropped).rivals == ("backlash", "cogging")
+
+
 def test_nothing_to_separate(monkeypatch: pytest.MonkeyPatch):
     alone = scored("windage", 1.0, np.zeros(TIME.size))
     for rounds in (

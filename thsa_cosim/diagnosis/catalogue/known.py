@@ -2,6 +2,7 @@
 
 import importlib.util
 import pkgutil
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
@@ -23,7 +24,7 @@ def known_effects(folder: Path | None = None) -> dict[str, Effect]:
     return {effect.name: effect for effect in found}
 
 
-def choose(known: dict[str, Effect], names: tuple[str, ...], where: str) -> dict[str, Effect]:
+def choose(known: dict[str, Effect], names: Sequence[str], where: str) -> dict[str, Effect]:
     """The named effects, or all of them; ScenarioError names ``where`` for one that is unknown."""
     for name in names:
         if name not in known:

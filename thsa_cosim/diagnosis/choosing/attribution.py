@@ -96,9 +96,8 @@ def attribute(
         say(f"screening {len(candidates)} candidates{beside}")
         offered: Sequence[Candidate] = candidates
         while offered:
-            taken = {s.candidate.key for s in accepted}
             selection = Selection(bench, weights, current, current_held, say)
-            left = [c for c in offered if c.key not in taken]
+            left = [c for c in offered if not any(_is_taken(c, s.candidate) for s in accepted)]
             rounds.append(
                 _round(selection, left, scan(current), seed + len(rounds), accepted, offered is candidates)
             )
@@ -143,6 +142,15 @@ def further_parts(accepted: Candidate, candidates: Sequence[Candidate]) -> list[
     ]
 
 
+def _is_taken(candidate: Candidate, accepted: Candidate) -> bool:
+    """Whether an accepted one leaves no room: the same, or another form of the same effect in the same place.
+
+    Forms are alternatives: two of them at once only make up for each other's misfit.
+    """
+    alternative = not candidate.variant.beside and candidate.name == accepted.name
+    return candidate.key == accepted.key or alternative
+
+
 def _round(
     selection: Selection,
     offered: Sequence[Candidate],
@@ -156,6 +164,12 @@ def _round(
     gains = largest_gains(selection.current, proposals, seed)
     limit = threshold(gains)
     scored = selection.refined(proposals, limit)
+    if whole and proposals and selection.is_open(scored):
+        further = selection.further(proposals)
+        scored = selection.refined_further(scored, proposals, further, limit)
+        proposals = sorted([*proposals, *further], key=lambda p: -p.gain)
+        gains = largest_gains(selection.current, proposals, seed)
+        limit = threshold(gains)
     choice, objections = selection.choose(scored, limit, not accepted, not whole)
     rivals: tuple[Scored, ...] = ()
     if choice is not None and whole:

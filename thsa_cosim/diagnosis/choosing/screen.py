@@ -85,13 +85,18 @@ def screen(
 ) -> list[Proposal]:
     """All proposals, best first; a candidate that cannot be simulated is left out."""
     known = base.unknowns.named(base.vector)
-    rows: list[tuple[Candidate, dict[str, float]]] = [
+    rows = [
         (candidate, shapes)
         for candidate in candidates
         if not candidate.variant.beside or any(p.variable in known for p in candidate.all_parameters)
         for shapes in shape_starts(candidate, scanned, known)
     ]
-    variables = {p.variable: p for c in candidates for p in c.parameters}
+    return propose(bench, base, rows)
+
+
+def propose(bench: Bench, base: Fit, rows: Sequence[tuple[Candidate, Mapping[str, float]]]) -> list[Proposal]:
+    """A proposal for every candidate with its shapes at given starts, best first, less what cannot be simulated."""
+    variables = {p.variable: p for c, _ in rows for p in c.parameters}
     own = [
         Unknown(v, v, p.unit, p.at_start, np.inf, p.typical, p.lower, p.upper, declared=False)
         for v, p in variables.items()

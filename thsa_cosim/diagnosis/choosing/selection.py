@@ -17,6 +17,7 @@ from thsa_cosim.diagnosis.choosing.gates import (
 )
 from thsa_cosim.diagnosis.choosing.score import Scored, go_on, polish, score
 from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.choosing.starts import PROMISING, further_starts
 from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE, is_visible
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -37,6 +38,11 @@ RIVAL_WORTH = 0.3
 #: A small further effect that explains this share of what is left is fitted with all parameters before it is judged:
 #: what the first one's parameters have taken up of it counts for it as well.
 HALF = 0.5
+
+#: Ripples at so many other wave numbers are refined where no fit leaves nothing.
+WAVES = 6
+#: A further start is refined if it promises this much more than the candidate's starts before.
+BETTER = 1.05
 
 Say = Callable[[str], None]
 
@@ -67,6 +73,22 @@ def other_places(winner: Proposal, proposals: Sequence[Proposal]) -> list[Propos
     return list(found.values())
 
 
+def other_waves(proposals: Sequence[Proposal], scored: Sequence[Scored]) -> list[Proposal]:
+    """The ripples among ``proposals`` (best first) at wave numbers that were not refined.
+
+    Where a ripple makes a machine stick and slip, what a small one would do hardly tells one order from another.
+    """
+    refined = {id(s.proposal) for s in scored}
+    best = proposals[0].gain if proposals else 0.0
+    return [
+        p
+        for p in proposals
+        if id(p) not in refined
+        and p.gain >= PROMISING * best
+        and any(q.scanned and not q.fixed for q in p.candidate.shapes)
+    ][:WAVES]
+
+
 @dataclass(frozen=True, eq=False)
 class Selection:
     """A round against the model so far: its fit ``current`` and its held-out residuals ``held`` (N,)."""
@@ -79,9 +101,12 @@ class Selection:
 
     def refined(self, proposals: Sequence[Proposal], limit: float) -> list[Scored]:
         """What is worth it, fitted with the declared parameters, best on held-out recordings first."""
+        return self._fitted(worth_refining(proposals, limit))
+
+    def _fitted(self, proposals: Sequence[Proposal]) -> list[Scored]:
         scored: list[Scored] = []
         solved = 0.0
-        for proposal in worth_refining(proposals, limit):
+        for proposal in proposals:
             if proposal.gain < RIVAL_WORTH * solved:
                 continue
             self.say(f"fitting {proposal.label}")
@@ -93,6 +118,31 @@ class Selection:
         most = max((s.fit_gain for s in scored), default=0.0)
         scored = [self._go_on(s) if s.fit_gain > RIVAL_WORTH * most else s for s in scored]
         return sorted(scored, key=lambda s: -s.held_out_gain)
+
+    def is_open(self, scored: Sequence[Scored]) -> bool:
+        """Whether something is left to explain, and no fit so far leaves nothing."""
+        fits = [self.held, *(s.validate for s in scored)]
+        return all(self.weights.left(held) >= SMALLEST_STRUCTURE**2 for held in fits)
+
+    def further(self, proposals: Sequence[Proposal]) -> list[Proposal]:
+        """Further starts of the shapes of the best ``proposals``."""
+        self.say("searching further starts of the effects' shapes")
+        return further_starts(self.bench, self.current, proposals)
+
+    def refined_further(
+        self,
+        scored: Sequence[Scored],
+        proposals: Sequence[Proposal],
+        further: Sequence[Proposal],
+        limit: float,
+    ) -> list[Scored]:
+        """``scored`` and what is worth it of ``further`` starts and other wave numbers, fitted; best first."""
+        before: dict[str, float] = {}
+        for p in proposals:
+            before[p.candidate.key] = max(before.get(p.candidate.key, 0.0), p.gain)
+        better = worth_refining([p for p in further if p.gain > BETTER * before[p.candidate.key]], limit)
+        chosen = sorted([*better, *other_waves(proposals, scored)], key=lambda p: -p.gain)
+        return sorted([*scored, *self._fitted(chosen)], key=lambda s: -s.held_out_gain)
 
     def evidence(self, one: Scored) -> Evidence:
         """What speaks for a candidate."""
@@ -126,7 +176,7 @@ class Selection:
                 evidence = self.evidence(one)
             why = objection_beside(evidence, limit) if beside else objection(evidence, limit, first)
             if not why:
-                one = one if whole else self._whole(one)
+                one = one if whole else self._whole(one, apart=first and not objections)
                 why = insignificant(one)
                 if not why and (name := out_of_range(one.fit)):
                     why = f"{one.candidate.name}: it drives the declared parameter {name} to the end of its range"
@@ -162,9 +212,9 @@ class Selection:
                 rivals[name] = polished
         return tuple(rivals.values())
 
-    def _whole(self, one: Scored) -> Scored:
+    def _whole(self, one: Scored, apart: bool = False) -> Scored:
         self.say(f"fitting {one.candidate.name} with all parameters")
-        return polish(self.bench, one, self.current, self.held)
+        return polish(self.bench, one, self.current, self.held, apart=apart)
 
     def _go_on(self, one: Scored) -> Scored:
         return go_on(self.bench, one, self.current, self.held)

@@ -21,7 +21,7 @@ from thsa_cosim.diagnosis.fitting.unknowns import Unknown
 from thsa_cosim.diagnosis.results import Balance
 from thsa_cosim.inverse_dynamics import low_pass
 from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario import BalanceSpec, DiagnoseSpec, Scenario
+from thsa_cosim.scenario import BalanceTable, DiagnoseSpec, Scenario
 from thsa_cosim.scenario.formula import Formula, parse_formula
 from thsa_cosim.signals import FloatArray
 
@@ -54,7 +54,7 @@ def close_balances(scenario: Scenario, spec: DiagnoseSpec) -> tuple[Balance, ...
 
 
 def _close(
-    scenario: Scenario, spec: BalanceSpec, drawing: Mapping[str, Mapping[str, Unknown]]
+    scenario: Scenario, spec: BalanceTable, drawing: Mapping[str, Mapping[str, Unknown]]
 ) -> Balance | None:
     formulas = formulas_of(scenario, spec)
     groups: dict[str, list[Record]] = {}
@@ -81,7 +81,7 @@ def _close(
     )
 
 
-def formulas_of(scenario: Scenario, spec: BalanceSpec) -> tuple[Formula, ...]:
+def formulas_of(scenario: Scenario, spec: BalanceTable) -> tuple[Formula, ...]:
     """The left side and the terms of a balance."""
     known = (*scenario.inputs, *scenario.measured, *scenario.parameters.names)
     where = f"{scenario.path}: diagnose.balances[{spec.name}]"
@@ -216,7 +216,7 @@ class Regression:
         return float(np.sqrt(np.mean(np.concatenate(drawn) ** 2)))
 
 
-def record_of(recording: Recording, spec: BalanceSpec, formulas: tuple[Formula, ...]) -> Record | None:
+def record_of(recording: Recording, spec: BalanceTable, formulas: tuple[Formula, ...]) -> Record | None:
     """A recording for a balance, or None where it is too short for the band or stands throughout."""
     signals = recording.compared
     step = float(np.median(np.diff(signals.time)))
@@ -225,12 +225,12 @@ def record_of(recording: Recording, spec: BalanceSpec, formulas: tuple[Formula, 
     if size < 4 * reach or 2.0 * spec.band * step >= 0.9:
         return None
     # In an order of their own: noise is drawn signal by signal.
-    names = sorted(frozenset().union(*(f.names for f in formulas), spec.moving))
+    names = sorted(frozenset().union(*(f.names for f in formulas), spec.moving_signals))
     even = signals.resample(signals.time[0] + step * np.arange(size))
     values = {name: even[name] for name in names if name in even}
     still = np.zeros(size, dtype=bool)
     still[[0, -1]] = True
-    for name in spec.moving:
+    for name in spec.moving_signals:
         still |= _standing(values[name], recording.noise.get(name, 0.0))
     kept = np.convolve(still, np.ones(2 * reach + 1), mode="same") < 0.5
     return Record(formulas, values, recording.noise, kept, step, spec.band) if kept.any() else None

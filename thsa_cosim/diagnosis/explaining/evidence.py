@@ -22,7 +22,7 @@ from thsa_cosim.diagnosis.fitting.identified import Identified
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.results import Balance, Evidence
 from thsa_cosim.inverse_dynamics import low_pass
-from thsa_cosim.scenario import BalanceSpec, Scenario
+from thsa_cosim.scenario import BalanceTable, Scenario
 from thsa_cosim.signals import FloatArray, Signals
 
 _BINS = 30
@@ -56,7 +56,7 @@ def evidence(
 
 def _over_cause(
     scenario: Scenario,
-    spec: BalanceSpec,
+    spec: BalanceTable,
     part: str,
     shown: Sequence[Trial],
     before: Identified,
@@ -98,7 +98,7 @@ def _groups(trials: Sequence[Trial]) -> list[str]:
 
 def _residuals(
     scenario: Scenario,
-    spec: BalanceSpec,
+    spec: BalanceTable,
     trials: Sequence[Trial],
     group: str,
     before: Identified,

@@ -29,15 +29,15 @@ def separating_experiment(
     trials: Sequence[Trial],
     open_runner: OpenRunner,
 ) -> SeparatingExperiment | None:
-    """The profile of ``spec.command`` and ``spec.load`` at which the first effect and its rival differ most.
+    """The profile of ``spec.command`` and ``spec.load`` at which an effect and its rival differ most.
 
-    ``trials`` run the model that holds all effects. The rival is what the recordings cannot tell from the effect, else
-    the runner-up. ``distance`` is the sum over the outputs' samples of the squared difference of both models, as fitted
-    to the present recordings, in variances of the noise; ``present`` the same on the fit recordings, for as long a
-    time. The other inputs are held at what they were in the first fit recording. None without an accepted effect, a
-    second candidate or a command.
+    ``trials`` run the model that holds all effects. The first pair that the recordings cannot tell apart counts, else
+    the first effect and its runner-up. ``distance`` is the sum over the outputs' samples of the squared difference of
+    both models, as fitted to the present recordings, in variances of the noise; ``present`` the same on the fit
+    recordings, for as long a time. The other inputs are held at what they were in the first fit recording. None
+    without an accepted effect, a second candidate or a command.
     """
-    pair = _rivals(found)
+    pair, factors = _rivals(found)
     fit = [t for t in trials if t.part == "fit"]
     if pair is None or spec.command is None or not fit:
         return None
@@ -75,20 +75,26 @@ def separating_experiment(
         distance = _distance(one.signals, other.signals, weights)
         if best is None or distance > best.distance:
             names = (pair[0].candidate.name, pair[1].candidate.name)
-            present = _present(pair, found.rounds[0].factors, fit, time.size)
+            present = _present(pair, factors, fit, time.size)
             best = SeparatingExperiment(profile.name, names, distance, present, own)
     return best
 
 
-def _rivals(found: Attribution) -> tuple[Scored, Scored] | None:
-    """The first accepted effect and what is nearest to it: a rival, else the best of the other effects."""
-    first = found.rounds[0] if found.rounds else None
-    winner = None if first is None else first.accepted
-    if first is None or winner is None or winner not in found.accepted:
-        return None
-    others = [s for s in first.scored if s.candidate.effect.name != winner.candidate.effect.name]
-    second = next(iter((*first.rivals, *others)), None)
-    return None if second is None else (winner, second)
+def _rivals(found: Attribution) -> tuple[tuple[Scored, Scored] | None, FloatArray]:
+    """An accepted effect and what the recordings cannot tell from it, else the first one and the best of the others.
+
+    And the factors (N,) that the residuals of their fits hold.
+    """
+    kept = [r for r in found.rounds if r.accepted is not None and r.accepted in found.accepted]
+    for one in kept:
+        if one.rivals and one.accepted is not None:
+            return (one.accepted, one.rivals[0]), one.factors
+    for one in kept[:1]:
+        winner = one.accepted
+        others = (s for s in one.scored if s.candidate.effect.name != winner.candidate.effect.name)  # type: ignore[union-attr]
+        if winner is not None and (second := next(others, None)) is not None:
+            return (winner, second), one.factors
+    return None, np.zeros(0)
 
 
 def _values(scored: Scored, group: str) -> Mapping[str, float]:

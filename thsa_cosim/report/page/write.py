@@ -32,6 +32,7 @@ from thsa_cosim.report.tune.pareto import pareto
 from thsa_cosim.report.tune.plane import plane
 from thsa_cosim.report.tune.responses import responses
 from thsa_cosim.report.tune.schedule import schedule
+from thsa_cosim.report.tune.start import start
 
 PAGE = "report.html"
 
@@ -42,7 +43,7 @@ SECTIONS: dict[str, tuple[SectionOf, ...]] = {
     "identify": (data, comparison, convergence, correlation),
     "simulate": (data, comparison),
     "diagnose": (data, attribution, before_after, structure, recordings, candidates, convergence),
-    "tune": (gains, responses, plane, schedule, pareto, convergence),
+    "tune": (gains, responses, start, plane, schedule, pareto, convergence),
 }
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 from thsa_cosim.report.files import RESULT, write_json
 from thsa_cosim.report.page.pictures import write_pictures
 from thsa_cosim.report.signal_files import write_signals
-from thsa_cosim.report.tune.result import tune_to_dict, write_check_csv, write_pareto_csv
+from thsa_cosim.report.tune.result import tune_to_dict, write_check_csv, write_pareto_csv, write_start_csv
 from thsa_cosim.report.tune.schedule_files import write_schedule
+from thsa_cosim.scenario.tune_model import PROFILE
 from thsa_cosim.signals import Signals
 from thsa_cosim.tune import TuneResult
 
@@ -28,6 +29,9 @@ def write_tune(result: TuneResult, folder: Path, on_file: Callable[[Path], None]
     if result.pareto is not None and result.pareto.x.size:
         write_pareto_csv(folder / "pareto.csv", result, result.pareto)
         note(folder / "pareto.csv")
+    if result.scenario.start is not None and result.after is not None:
+        write_start_csv(folder / "start.csv", result)
+        note(folder / "start.csv")
     if result.schedule is not None:
         for path in write_schedule(folder, result.schedule.schedule, result.scenario.title):
             note(path)
@@ -42,12 +46,14 @@ def write_tune(result: TuneResult, folder: Path, on_file: Callable[[Path], None]
 def write_responses(result: TuneResult, folder: Path) -> list[Path]:
     """Write command and responses under every condition: the commanded output in the cost's unit, others in theirs."""
     scenario = result.scenario
-    command, unit = scenario.command, scenario.cost.unit
+    unit = scenario.cost.unit
     others = [n for n in (scenario.metrics.effort, *(r.signal for r in scenario.requirements)) if n]
     units = {axis.name: axis.unit for axis in scenario.axes}
     written: dict[str, Path] = {}
     for k, condition in enumerate(result.conditions):
-        label = ", ".join(f"{n} = {v:g} {units[n]}" for n, v in condition.items()) or "response"
+        command, profile = scenario.command_of(condition), scenario.profile_of(condition)
+        label = ", ".join(f"{n} = {v:g} {units[n]}" for n, v in condition.items() if n != PROFILE)
+        label = ", ".join(t for t in (profile.recording.name if profile else "", label) if t) or "response"
         if label in written:  # the same condition with a sample of uncertain parameters
             continue
         variants = {

@@ -48,12 +48,14 @@ def tune_to_dict(result: TuneResult) -> dict[str, Any]:
         "surface": _surface(result.surface),
         "schedule": _schedule_rows(result),
         "schedule_check": _check(result.schedule),
+        "start": start_rows(result),
         "command": {
             "output": scenario.command.output,
             "unit": scenario.cost.unit,
             "input": scenario.command.input,
         },
         "conditions": {axis.name: {"unit": axis.unit, "values": list(axis.values)} for axis in scenario.axes},
+        "profiles": [profile.recording.name for profile in scenario.profiles],
         "term_units": term_units(result),
         "groups": [
             {
@@ -104,18 +106,46 @@ def term_units(result: TuneResult) -> dict[str, str]:
     """The unit of every term of the cost and the requirements."""
     scenario = result.scenario
     unit = scenario.cost.unit
-    units = {name: own for name, (own, _) in METRICS.items() if own}
+    units = {name: own for name, (own, _) in METRICS.items() if own and name in result.terms}
     units |= {"tracking": f"({unit})²", "tracking_error": unit}
     for name in result.terms:
         signal = scenario.metrics.effort if name == "effort" else name.partition(".")[2]
+        if name == "breakaway_current" and scenario.start is not None:
+            signal = scenario.start.current
         if name not in units and signal:
             units[name] = scenario.fmu.variables[signal].unit or "1"
     return units
 
 
+def start_rows(result: TuneResult) -> list[dict[str, Any]]:
+    """The start from rest: one row per set of gains and condition, with the terms of ``[start]``; empty without it."""
+    spec = result.scenario.start
+    if spec is None:
+        return []
+    units = {axis.name: axis.unit for axis in result.scenario.axes}
+    columns = [(name, result.terms.index(name)) for name in spec.terms]
+    return [
+        {
+            "gains": scored.name,
+            **{condition_key(n, units[n]): v for n, v in condition.items()},
+            **{name: float(terms[k]) for name, k in columns},
+        }
+        for scored in (result.before, *result.compare, result.after)
+        if scored is not None
+        for condition, terms in zip(result.conditions, scored.terms, strict=True)
+    ]
+
+
+def write_start_csv(path: Path, result: TuneResult) -> None:
+    """The rows of :func:`start_rows` as a table."""
+    rows = start_rows(result)
+    cells = [[v if isinstance(v, str) else _cell(v) for v in row.values()] for row in rows]
+    write_csv(path, list(rows[0]), cells)
+
+
 def condition_key(name: str, unit: str) -> str:
     """``temperature_degC`` for a condition in degC, else ``F_load_kN``: what a row of the schedule calls it."""
-    return "temperature_degC" if unit == "degC" else f"{name}_{unit}"
+    return "temperature_degC" if unit == "degC" else f"{name}_{unit}" if unit else name
 
 
 def _schedule_rows(result: TuneResult) -> list[dict[str, Any]]:

@@ -5,7 +5,7 @@ from rich.table import Table
 from rich.text import Text
 
 from thsa_cosim.report.parts.text import number
-from thsa_cosim.report.tune.result import term_units
+from thsa_cosim.report.tune.result import start_rows, term_units
 from thsa_cosim.tune import ScheduleCheck, Scored, TuneResult
 
 
@@ -26,6 +26,8 @@ def print_tune(console: Console, result: TuneResult) -> None:
             highlight=False,
             soft_wrap=True,
         )
+    if result.scenario.start is not None and result.after is not None:
+        console.print(_start_table(result))
     if result.schedule is not None:
         console.print(_schedule_table(result))
         if result.schedule.check is not None:
@@ -53,6 +55,18 @@ def _sets_table(title: str, sets: list[Scored], result: TuneResult) -> Table:
     if any(not s.feasible for s in sets):
         table.caption = "!: beyond the limit"
         table.caption_justify = "left"
+    return table
+
+
+def _start_table(result: TuneResult) -> Table:
+    rows = [row for row in start_rows(result) if row["gains"] == "after"]
+    units = term_units(result)
+    table = Table(title="Start from rest after a soak, with the tuned gains", title_justify="left")
+    for name in list(rows[0])[1:]:
+        unit = units.get(name)
+        table.add_column(Text(name if unit in (None, "1") else f"{name} [{unit}]"), justify="right")
+    for row in rows:
+        table.add_row(*(number(value, 3) for value in list(row.values())[1:]))
     return table
 
 

@@ -322,16 +322,16 @@ def system() -> list[Row]:
         Row(
             "two motors, active/standby, secondary load path",
             "drawn, then set aside",
-            "one motor, one load path",
+            "two lanes, two load paths",
             ABSENT,
-            "`THSA.Actuator`, like the article's own equations, is a single lane",
+            "`THSA.RedundantActuator` ([page](redundant-actuator.md)); the article prints no equation and no number",
         ),
         Row(
             "nine temperature sensors",
             "on the bench",
-            "one temperature, `T_amb`",
+            "`T_motor`, `T_gearbox`, `T_screw`, `T_amb`",
             ABSENT,
-            "the rig's recordings have one temperature",
+            "the rig's recordings have one temperature, that of the [warm-up](part-temperatures.md) has two",
         ),
         Row(
             "preload and breakaway over temperature",

@@ -29,7 +29,8 @@ def test_unknowns_are_as_many_as_coefficients_and_give_the_law_back(form: str) -
     assert len(law.unknowns) == FORMS[form]
     if form in ("exponential", "double-exponential"):
         true = Law(form, (1e-2, -4e-2, 3e-2, 9e-3)[: FORMS[form]])
-        values = [1e-2 * np.exp(-4e-2 * COLD), -4e-2, 3e-2 * np.exp(9e-3 * WARM), 4.9e-2][: FORMS[form]]
+        ends = true(np.array([COLD, WARM])).tolist()
+        values = [ends[0], -4e-2] if form == "exponential" else [*ends, -4e-2, 4.9e-2]
     else:
         true = Law(form, tuple(RNG.uniform(0.5, 1.0, FORMS[form]) * 80.0 ** -np.arange(FORMS[form])))
         values = true(law.nodes).tolist()

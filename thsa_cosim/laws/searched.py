@@ -1,9 +1,8 @@
 """A law over temperature as what is searched: unknowns of one size in place of its coefficients, and the way back.
 
 Coefficients of a cubic law in degC differ by nine orders of magnitude and are all but collinear. A polynomial is
-therefore searched by its values at as many temperatures (nodes); an exponential α exp(β t) by its value at the cold
-end and its rate β, a second term by its value at the warm end and by what its rate is above the first one's: as neither
-term can take the place of the other, every law has one set of unknowns.
+therefore searched by its values at as many temperatures (nodes); an exponential by its value at the cold end and its
+rate; two exponentials by the values of their sum at both ends, by the lower rate, and by how far the other is above it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,6 +15,8 @@ from thsa_cosim.parameters import Parameter
 
 #: An exponential changes by at most this factor, e^±6, over the temperatures: as in a fit to points.
 STEEPEST = 6.0
+#: Two rates differ at least by this share of the steepest: two terms of one rate are one term.
+LEAST_APART = 0.05
 #: Forms that can be searched.
 SEARCHABLE = (*POLYNOMIALS, "copper", "exponential", "double-exponential")
 
@@ -35,9 +36,11 @@ class SearchedLaw:
 
     @property
     def nodes(self) -> FloatArray:
-        """(k,) degC of the values that are searched; for exponentials the ends."""
-        if self.form not in (*POLYNOMIALS, "copper"):
+        """(k,) degC of the values that are searched."""
+        if self.form == "double-exponential":
             return np.array([self.cold, self.warm])
+        if self.form == "exponential":
+            return np.array([self.cold])
         return (
             np.linspace(self.cold, self.warm, FORMS[self.form])
             if FORMS[self.form] > 1
@@ -49,10 +52,14 @@ class SearchedLaw:
         """What is searched, in the order of the coefficients; values have bounds, scale and unit of the parameter."""
         if self.form in (*POLYNOMIALS, "copper"):
             return tuple(self._value(t, f"a{k}") for k, t in enumerate(self.nodes.tolist()))
-        terms = [(self._value(self.cold, "alpha1", share=True), self._rate("beta1"))]
-        if self.form == "double-exponential":
-            terms.append((self._value(self.warm, "alpha2", share=True), self._rate("beta2", above="beta1")))
-        return tuple(p for term in terms for p in term)
+        values = tuple(self._value(t, f"alpha{k + 1}") for k, t in enumerate(self.nodes.tolist()))
+        steepest = STEEPEST / (self.warm - self.cold)
+        rate = Parameter(f"{self.parameter.name}.beta1", f"{self.block}.beta1", "1/K", -steepest, steepest)
+        if self.form == "exponential":
+            return (*values, rate)
+        label = f"{self.parameter.name}.beta2-beta1"
+        apart = Parameter(label, f"{self.block}.beta2", "1/K", LEAST_APART * steepest, 2.0 * steepest)
+        return (*values, rate, apart)
 
     @property
     def members(self) -> tuple[str, ...]:
@@ -72,27 +79,19 @@ class SearchedLaw:
         factor = self.parameter.to_variable(1.0)
         return {n: v if ".beta" in n else v * factor for n, v in law.block_values(self.block).items()}
 
-    def _value(self, temperature: float, coefficient: str, *, share: bool = False) -> Parameter:
+    def _value(self, temperature: float, coefficient: str) -> Parameter:
         p = self.parameter
-        name, lower, scale = p.name, p.lower, p.scale
-        if share:  # of a sum of terms one may be next to nothing, where a log scale would have no end
-            name, lower, scale = f"{p.name}.{coefficient}", min(0.0, p.lower), "linear"
         return Parameter(
-            f"{name}({temperature:.4g} degC)",
+            f"{p.name}({temperature:.4g} degC)",
             f"{self.block}.{coefficient}",
             p.unit,
-            lower,
+            p.lower,
             p.upper,
-            scale,
-            None if share else p.start,
+            p.scale,
+            p.start,
             f"{p.description} at {temperature:.4g} degC".strip(),
             p.variable_unit,
         )
-
-    def _rate(self, coefficient: str, above: str = "") -> Parameter:
-        steepest, name = STEEPEST / (self.warm - self.cold), f"{self.parameter.name}.{coefficient}"
-        label, lower = (f"{name}-{above}", 0.0) if above else (name, -steepest)
-        return Parameter(label, f"{self.block}.{coefficient}", "1/K", lower, steepest)
 
     def _coefficients(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The coefficients (k,) and their derivative (k, k) by the unknowns ``y`` (k,)."""
@@ -105,12 +104,28 @@ class SearchedLaw:
             scaled = np.linalg.inv(np.vander(self.nodes / size, y.size, increasing=True))
             slopes = scaled / (size ** np.arange(y.size))[:, None]
             return np.asarray(slopes @ y), np.asarray(slopes)
-        coefficients, slopes = np.empty(y.size), np.zeros((y.size, y.size))
-        for k, at in zip(range(0, y.size, 2), self.nodes.tolist(), strict=False):
-            value, rate = y[k], float(np.sum(y[1 : k + 2 : 2]))
-            shrink = np.exp(-rate * at)
-            coefficients[k : k + 2] = value * shrink, rate
-            slopes[k, k] = shrink
-            slopes[k, 1 : k + 2 : 2] = -at * value * shrink
-            slopes[k + 1, 1 : k + 2 : 2] = 1.0
+        return self._two_exponentials(y) if self.form == "double-exponential" else self._one_exponential(y)
+
+    def _one_exponential(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        value, rate = y
+        shrink = np.exp(-rate * self.cold)
+        slopes = np.array([[shrink, -self.cold * value * shrink], [0.0, 1.0]])
+        return np.array([value * shrink, rate]), slopes
+
+    def _two_exponentials(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """α1, β1, α2, β2 from the sum at both ends, β1 and β2 − β1; A and C are the terms at their own ends."""
+        span, rates = self.warm - self.cold, np.array([y[2], y[2] + y[3]])
+        rise, fall = np.exp(rates[0] * span), np.exp(-rates[1] * span)
+        solve = np.linalg.inv(np.array([[1.0, fall], [rise, 1.0]]))
+        amplitudes = solve @ y[:2]
+        by_first = -solve @ np.array([0.0, span * rise * amplitudes[0]])
+        by_second = -solve @ np.array([-span * fall * amplitudes[1], 0.0])
+        inner = np.column_stack([solve, by_first + by_second, by_second])  # of A and C by the unknowns
+        by_rates = np.array([[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
+        coefficients, slopes = np.empty(4), np.empty((4, 4))
+        for k, at in enumerate(self.nodes.tolist()):
+            shrink = np.exp(-rates[k] * at)
+            coefficients[2 * k : 2 * k + 2] = amplitudes[k] * shrink, rates[k]
+            slopes[2 * k] = shrink * (inner[k] - at * amplitudes[k] * by_rates[k])
+            slopes[2 * k + 1] = by_rates[k]
         return coefficients, slopes

@@ -14,7 +14,7 @@ def test_the_standby_lane_takes_over_within_the_limits_of_the_drive(tmp_path: Pa
     """The pair of table IV saturates the drive at the take-over, the tuned one does not, and is as fast."""
     found = tc.tune(SCENARIOS / "standby.toml", folder=tmp_path / "study", workers=1, quiet=True).result
     before, after = found["before"], found["after"]
-    assert before["peak.i_B"] == pytest.approx(40.0)
+    assert before["peak.i_B"] > 39.9
     assert after["peak.i_B"] <= 38.0
     assert after["overshoot"] <= 0.03
     assert after["rise_time"] < 1.02 * before["rise_time"]

@@ -1,11 +1,11 @@
-"""docs/article.md: every claim of the article beside what our studies find, with the figures.
+"""docs/article.md and docs/cold-start.md: every claim of the article beside what our studies find, with the figures.
 
     python benchmarks/article.py [--studies studies/article] [--check]
 
 Runs the studies that are not finished in ``--studies`` (an interrupted one is continued), takes their numbers, and
 writes ``docs/article/numbers.json``, the pictures beside it and the page. ``--check`` writes nothing: it compares the
 studies' numbers with the stored ones and ends with exit code 1 if one of them differs by more than its tolerance.
-About two minutes of processor time without finished studies.
+About three minutes of processor time without finished studies.
 """
 
 import argparse
@@ -19,11 +19,12 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 SCENARIOS = ROOT / "scenarios"
 PAGE = ROOT / "docs" / "article.md"
+COLD_START = ROOT / "docs" / "cold-start.md"
 FOLDER = ROOT / "docs" / "article"
 sys.path.append(str(HERE))
 
 import article_numbers as numbers
-from article_page import page
+from article_page import cold_start_page, page
 
 #: Studies by folder: command and scenario.
 STUDIES = {
@@ -31,6 +32,8 @@ STUDIES = {
     "current_alone": ("identify", "motor"),
     "table4": ("tune", "table4"),
     "tuned_at_25": ("tune", "tuned_at_25"),
+    "cold_start": ("tune", "cold_start"),
+    "profile": ("tune", "profile"),
 }
 #: Relative difference of two runs that counts: searches end within standard errors, not within rounding.
 TOLERANCE = 0.03
@@ -57,7 +60,8 @@ def main() -> int:
     text = json.dumps(found, indent=1, ensure_ascii=False)
     (FOLDER / "numbers.json").write_text(text + "\n", encoding="utf-8")
     PAGE.write_text(page(found), encoding="utf-8")
-    print(f"written: {PAGE.relative_to(ROOT)}, {len(list(FOLDER.glob('*.png')))} pictures")
+    COLD_START.write_text(cold_start_page(found), encoding="utf-8")
+    print(f"written: docs/{PAGE.name}, docs/{COLD_START.name}, {len(list(FOLDER.glob('*.png')))} pictures")
     return 0
 
 
@@ -102,6 +106,10 @@ def collect(results: dict[str, numbers.Json]) -> numbers.Json:
         "current_alone": {name: {k: one[k] for k in ("value", "stderr")} for name, one in alone.items()},
         "table4": numbers.tuned_numbers(results["table4"]),
         "tuned_at_25": numbers.tuned_numbers(results["tuned_at_25"]),
+        "profile": numbers.tuned_numbers(results["profile"]),
+        "start": numbers.start_numbers(results["cold_start"], benches["laws"]),
+        "start_gains": results["cold_start"]["gains"],
+        "efficiency": numbers.efficiency_numbers(benches),
     }
 
 

@@ -7,6 +7,8 @@ import matplotlib as mpl
 import numpy as np
 import pyarrow.parquet as pq
 from article_numbers import (
+    EFFICIENCY_AT,
+    GEAR_RATIO,
     LEAD,
     SPEEDS,
     TABLES,
@@ -14,12 +16,16 @@ from article_numbers import (
     FloatArray,
     Json,
     friction_points,
+    load_torque,
+    motor_of,
     published,
     ramp,
+    start_numbers,
 )
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from thsa_cosim.efficiency import motor_efficiency
 from thsa_cosim.laws import COPPER
 from thsa_cosim.report.identify.parameters import read_law
 
@@ -45,7 +51,55 @@ def draw_all(folders: dict[str, Path], results: dict[str, Json], target: Path) -
     _save(_friction(laws, "nut"), target / "fig8.png")
     _save(_validation(folders["article"] / "4_fig10"), target / "fig10.png")
     _save(_gains(folders), target / "fig11.png")
+    _save(_efficiency(laws), target / "efficiency.png")
+    _save(_start(start_numbers(results["cold_start"], laws)), target / "start.png")
     _save(_population(folders["table4"], results["table4"]), target / "population.png")
+
+
+def _efficiency(laws_of: Json) -> Figure:
+    """The motor's efficiency over shaft torque and speed, with the point of 55 kN at 9 mm/s."""
+    laws = {name: read_law(law) for name, law in laws_of.items()}
+    torque, speed = np.linspace(0.05, 8.0, 120), np.linspace(2.0, 200.0, 120)
+    figure = Figure(figsize=(9.0, 3.4), layout="constrained")
+    axes = figure.subplots(1, 3, sharey=True)
+    filled = None
+    for axis, t in zip(axes, EFFICIENCY_AT, strict=True):
+        found = motor_efficiency(torque[:, None], speed[None, :], **motor_of(laws, t))
+        filled = axis.contourf(speed, torque, found, levels=np.arange(0.0, 1.01, 0.05), cmap="viridis")
+        lines = axis.contour(
+            speed, torque, found, levels=(0.5, 0.7, 0.8, 0.9), colors="white", linewidths=0.8
+        )
+        axis.clabel(lines, fontsize=7)
+        point = load_torque(laws, t, 55e3, 9e-3)
+        axis.plot(9e-3 * GEAR_RATIO / LEAD, point, "o", color=OURS, ms=6, mec="white")
+        axis.set(title=f"{t:g} °C".replace("-", "−"), xlabel="speed [rad/s]")
+        axis.grid(visible=False)
+    axes[0].set_ylabel("shaft torque [N·m]")
+    figure.colorbar(filled, ax=axes, label="efficiency of the motor")
+    return figure
+
+
+def _start(rows: list[Json]) -> Figure:
+    """Breakaway margin, reserves and start time over temperature, by load."""
+    figure = Figure(figsize=(9.0, 3.2), layout="constrained")
+    axes = figure.subplots(1, 3)
+    loads = sorted({row["F_load_kN"] for row in rows})
+    for load, colour in zip(loads, (ARTICLE, THIRD, OURS), strict=True):
+        own = [row for row in rows if row["F_load_kN"] == load]
+        t = [row["temperature_degC"] for row in own]
+        label = f"{load:g} kN".replace("-", "−")
+        axes[0].plot(t, [row["breakaway_current"] for row in own], "o-", ms=3, color=colour, label=label)
+        axes[0].plot(t, [row["static"] for row in own], ":", color=colour)
+        axes[1].plot(t, [1e3 * row["start_time"] for row in own], "o-", ms=3, color=colour)
+        axes[2].plot(t, [row["current_reserve"] for row in own], "o-", ms=3, color=colour)
+        axes[2].plot(t, [row["voltage_reserve"] for row in own], "--", color=colour)
+    axes[0].set(ylabel="current [A]", title="breakaway; dotted: static")
+    axes[0].legend(frameon=False, fontsize=8)
+    axes[1].set(ylabel="time [ms]", title="start time")
+    axes[2].set(ylim=(0.0, 1.0), title="reserve: current, dashed: voltage")
+    for axis in axes:
+        axis.set_xlabel("temperature [°C]")
+    return figure
 
 
 def _save(figure: Figure, path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from thsa_cosim.efficiency import motor_efficiency
 from thsa_cosim.laws import COPPER, Law, doubts_about, published_law, quantity_of
 from thsa_cosim.report.identify.parameters import read_law
 
@@ -21,6 +22,8 @@ SPEEDS = (0.5, 1.0, 2.0, 3.0, 4.5, 6.0, 7.5, 9.0)
 LEAD = 10e-3 / (2.0 * np.pi)
 """m/rad, k of the screw."""
 POLE_PAIRS = 4
+GEAR_RATIO = 30.0
+EFFICIENCY_AT = (25.0, -30.0, -55.0)
 #: Tables II and III: form, coefficients as `Law` has them, unit.
 TABLES: dict[str, tuple[str, list[float], str]] = {
     "R_s": ("cubic", [1.2, 3e-2, 7e-5, -5e-6], "ohm"),
@@ -184,6 +187,60 @@ def copper_loss(result: Json) -> Json:
             np.hypot(0.3 * np.mean(current), constant * 0.2 * np.mean(current)) / np.sqrt(steady.sum())
         ),
     }
+
+
+def load_torque(laws: dict[str, Law], temperature: float, force: float, speed: float) -> float:
+    """Torque [N.m] at the motor's shaft for ``force`` [N] at ``speed`` [m/s] > 0, by the rig's equations; 0: breakaway.
+
+    An aiding load costs the no-back device's drag less the load itself.
+    """
+    screw = LEAD * (force + float(laws["F_fn"](temperature) + laws["b_n"](temperature) * speed))
+    drag = 1.15 * max(0.0, -screw)
+    return (screw + drag + float(laws["T_fg"](temperature))) / GEAR_RATIO
+
+
+def efficiency_numbers(result: Json) -> Json:
+    """The motor's efficiency at 9 mm/s against 55 kN, the whole actuator's, and the recorded one at −30 °C."""
+    laws = {name: read_law(law) for name, law in result["laws"].items()}
+    speed = 9e-3 * GEAR_RATIO / LEAD
+    found: Json = {"motor": {}, "actuator": {}}
+    for t in EFFICIENCY_AT:
+        torque = load_torque(laws, t, 55e3, 9e-3)
+        motor = float(motor_efficiency(torque, speed, **motor_of(laws, t)))
+        found["motor"][f"{t:g}"] = motor
+        found["actuator"][f"{t:g}"] = motor * 55e3 * 9e-3 / (torque * speed)
+    table = pq.read_table(RECORDINGS / "ramp_m30_tuned_at_25.parquet").to_pandas()
+    steady = table[table["time_s"] > 1.5]
+    electrical = float(np.mean(steady["q_voltage_V"].to_numpy(float) * steady["q_current_A"].to_numpy(float)))
+    velocity, load = (float(np.mean(steady[c])) for c in ("velocity_mm_s", "load_kN"))
+    found["recorded_m30"] = velocity * load / electrical
+    return found
+
+
+def motor_of(laws: dict[str, Law], temperature: float) -> dict[str, float]:
+    """Arguments of ``motor_efficiency`` at a temperature."""
+    return {
+        "resistance": float(laws["R_s"](temperature)),
+        "torque_constant": float(np.sqrt(1.5) * POLE_PAIRS * laws["psi_pm"](temperature)),
+        "coulomb": float(laws["T_fm"](temperature)),
+        "viscous": float(laws["b_m"](temperature)),
+    }
+
+
+def start_numbers(result: Json, laws: Json) -> list[Json]:
+    """The start from rest with the tuned gains, and the static breakaway current by the identified laws."""
+    read = {name: read_law(law) for name, law in laws.items()}
+    rows = []
+    for row in result["start"]:
+        if row["gains"] != "after":
+            continue
+        t = row["temperature_degC"]
+        motor = motor_of(read, t)
+        torque = load_torque(read, t, 1e3 * row["F_load_kN"], 0.0) + motor["coulomb"]
+        rows.append(
+            {k: v for k, v in row.items() if k != "gains"} | {"static": torque / motor["torque_constant"]}
+        )
+    return rows
 
 
 def read_result(folder: Path) -> Json:

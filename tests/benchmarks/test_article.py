@@ -16,7 +16,9 @@ DOCS = ROOT / "docs"
 sys.path.append(str(ROOT / "benchmarks"))
 import article_numbers as numbers
 from article import differences
-from article_page import ABSENT, CONTRADICTED, REPRODUCED, page
+from article_page import ABSENT, CONTRADICTED, REPRODUCED, cold_start_page, page
+
+from thsa_cosim.efficiency import motor_efficiency
 
 STORED = json.loads((DOCS / "article" / "numbers.json").read_text(encoding="utf-8"))
 
@@ -24,6 +26,7 @@ STORED = json.loads((DOCS / "article" / "numbers.json").read_text(encoding="utf-
 def test_the_page_is_that_of_the_stored_numbers() -> None:
     """``python benchmarks/article.py`` writes both."""
     assert (DOCS / "article.md").read_text(encoding="utf-8") == page(STORED)
+    assert (DOCS / "cold-start.md").read_text(encoding="utf-8") == cold_start_page(STORED)
 
 
 def test_every_row_has_a_verdict_and_every_picture_is_there() -> None:
@@ -31,7 +34,8 @@ def test_every_row_has_a_verdict_and_every_picture_is_there() -> None:
     rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| ") and "claim" not in line]
     assert len(rows) > 40
     assert {row[3] for row in rows} == {REPRODUCED, CONTRADICTED, ABSENT}
-    for name in ("fig7", "fig8", "fig10", "fig11", "tables", "population"):
+    text += (DOCS / "cold-start.md").read_text(encoding="utf-8")
+    for name in ("fig7", "fig8", "fig10", "fig11", "tables", "population", "efficiency", "start"):
         assert f"(article/{name}.png)" in text
         assert 10_000 < (DOCS / "article" / f"{name}.png").stat().st_size < 150_000
 
@@ -75,6 +79,26 @@ def test_stored_numbers_support_the_verdicts() -> None:
     loss = STORED["copper_loss"]
     of_law = loss["formula"] * identified["R_s"]["stderr_m30"] / identified["R_s"]["m30"]
     assert abs(loss["balance"] - loss["formula"]) < 3.0 * np.hypot(loss["sigma"], of_law)
+
+
+def test_stored_start_and_efficiency_follow_from_the_published_laws() -> None:
+    """Static breakaway and efficiencies by tables II and III instead of the identified laws; and by the recording."""
+    laws = {name: numbers.published(name) for name in numbers.TABLES}
+    for row in STORED["start"]:
+        t = row["temperature_degC"]
+        motor = numbers.motor_of(laws, t)
+        torque = numbers.load_torque(laws, t, 1e3 * row["F_load_kN"], 0.0) + motor["coulomb"]
+        assert row["static"] == pytest.approx(torque / motor["torque_constant"], rel=0.01)
+        # A start with the tuned gains takes more: it accelerates the motor.
+        assert 1.0 < row["breakaway_current"] / row["static"] < 6.0
+        assert row["breakaway_margin"] == pytest.approx(40.0 / row["breakaway_current"] - 1.0)
+    found = STORED["efficiency"]
+    assert found["actuator"]["-30"] == pytest.approx(found["recorded_m30"], rel=0.005)
+    speed = 9e-3 * numbers.GEAR_RATIO / numbers.LEAD
+    for t in numbers.EFFICIENCY_AT:
+        torque = numbers.load_torque(laws, t, 55e3, 9e-3)
+        expected = float(motor_efficiency(torque, speed, **numbers.motor_of(laws, t)))
+        assert found["motor"][f"{t:g}"] == pytest.approx(expected, rel=0.005)
 
 
 @pytest.mark.nightly

@@ -176,3 +176,32 @@ def test_motion_and_ripple_are_no_smooth_noise() -> None:
         motion = 50.0 * np.sin(2 * np.pi * 0.3 * time) + np.sin(2 * np.pi * ripple * time)
         for noise in (1e-4, 1e-2, 0.3):
             assert independence(motion + rng.normal(0.0, noise, time.size)).kind is None
+
+
+def stepped(seed: int = 0) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Four set points of a speed, and a voltage that answers each step with a spike of two samples."""
+    random = np.random.default_rng(seed)
+    time = np.arange(0.0, 6.0, 1e-3)
+    speed = np.select([time < 0.5, time < 2.0, time < 4.0], [0.0, 5.0, -60.0], 150.0)
+    voltage = 0.5 * speed + random.normal(0.0, 0.3, time.size)
+    for k in np.flatnonzero(np.diff(speed)) + 1:
+        voltage[k : k + 2] += 25.0 * np.sign(speed[k] - speed[k - 1])
+    return time, {"w_cmd": speed, "u_q": voltage}
+
+
+def findings(time: np.ndarray, columns: dict[str, np.ndarray]) -> list[tuple[str, str]]:
+    channels = [Channel("run", name, "1", "other", time, values) for name, values in columns.items()]
+    return [(f.channel, f.kind) for f in inspect_channels("run", channels, [time]) if f.severity != "note"]
+
+
+def test_the_answer_to_a_step_of_the_command_is_no_spike() -> None:
+    time, columns = stepped()
+    assert findings(time, columns) == []
+    columns["u_q"][[1000, 3000, 5000]] += 25.0
+    assert findings(time, columns) == [("u_q", "spikes")]
+
+
+def test_a_schedule_of_set_points_is_no_coarse_sensor() -> None:
+    time, columns = stepped()
+    columns["x"] = np.round(30.0 * np.sin(time))  # a sensor: from one level to the next
+    assert findings(time, columns) == [("x", "coarse-resolution")]

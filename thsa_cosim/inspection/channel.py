@@ -23,6 +23,10 @@ _WINDOW, _LEAST_WINDOWS = 64, 6
 _DITHERED = 0.7
 """Noise, in quantisation steps, that no moving signal on a lattice makes up by itself."""
 _MOST_SPANS = 40
+_JUMP, _OFTEN = 0.02, 0.05
+"""Change of a command from sample to sample, in shares of its range, that is a jump; share of samples that are none."""
+_ANSWER = 4.5
+"""Samples after a jump of a command that may stand out: a voltage at a step of the speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +35,7 @@ class Channel:
 
     ``held``: the scenario says that the value stays until the next sample. ``averaged``: only its mean is used.
     ``written`` (n,): the numbers of the file, which a scenario's ``missing`` names; None: ``values``.
+    ``commanded`` (m,): times in s at which a command jumps; what a signal does right after is the machine's answer.
     """
 
     recording: str
@@ -42,6 +47,16 @@ class Channel:
     held: bool = False
     averaged: bool = False
     written: FloatArray | None = None
+    commanded: FloatArray | None = None
+
+    @cached_property
+    def jumps(self) -> FloatArray:
+        """Times in s at which a command jumps; none for a sensor's signal, or one that jumps all the time."""
+        change = np.abs(np.diff(self.plain))
+        large = change > _JUMP * self.range
+        if not self.silent or not 0 < np.count_nonzero(large) < _OFTEN * change.size:
+            return np.empty(0)
+        return self.time[1:][large]
 
     @cached_property
     def step(self) -> float:
@@ -117,6 +132,12 @@ class Channel:
         if not self.silent:
             fresh = self.fresh_index
             mask[fresh] = find_spikes(self.plain[fresh], self.noise)
+        if self.commanded is not None and self.commanded.size and mask.any():
+            since = (
+                self.time
+                - self.commanded[np.maximum(np.searchsorted(self.commanded, self.time, "right") - 1, 0)]
+            )
+            mask &= ~((since >= 0.0) & (since < _ANSWER * self.step))
         return mask
 
     @cached_property

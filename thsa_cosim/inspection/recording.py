@@ -1,6 +1,7 @@
 """All detectors over recordings."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -59,6 +60,8 @@ def inspect_channels(
     for time in times:
         yield from time_findings(recording, time)
     usable = [c for c in channels if c.values.size >= _LEAST and c.plain.min() < c.plain.max()]
+    jumps = np.unique(np.concatenate([np.empty(0), *(c.jumps for c in usable if c.role != "output")]))
+    usable = [replace(c, commanded=jumps) for c in usable]
     for channel in usable:
         for detect in CHANNEL_DETECTORS:
             yield from detect(channel)

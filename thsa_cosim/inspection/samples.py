@@ -17,6 +17,8 @@ _WINDOW, _MORE, _PART = 64, 0.3, 0.15
 _BURSTS, _LEAST = 5, 4
 _ABOVE = 2.0
 """Quantisation steps of noise from which on a value that repeats is no chance."""
+_SKIPPED, _VISITED = 2.0, 0.5
+"""Usual change in quantisation steps, and share of the levels visited, that make a signal a schedule of set points."""
 _LEVELS = 100
 """A signal that is met by fewer levels than this over its range is coarse, if no noise dithers them."""
 
@@ -115,6 +117,12 @@ def resolution(channel: Channel) -> Iterator[Finding]:
     levels = channel.range / step
     if channel.noise > _DITHERED * step or levels > _LEVELS:
         return
+    changes = np.abs(np.diff(channel.plain))
+    if (
+        np.median(changes[changes > 0.0]) > _SKIPPED * step
+        and np.unique(channel.plain).size < _VISITED * levels
+    ):
+        return  # a schedule of set points: a sensor goes from a level to the next one
     text = (
         f"{channel.name} is resolved to {channel.number(step)}, {levels:.0f} steps over its range, with too little"
         f" noise to dither them"

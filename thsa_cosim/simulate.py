@@ -257,7 +257,7 @@ def _cases(scenario: Scenario) -> list[tuple[Recording, str, Experiment]]:
                 inputs=scenario.drive(recording),
                 outputs=scenario.outputs,
                 time=communication_points(scenario, recording),
-                fixed={**fixed, **start},
+                fixed={**fixed, **start, **recording.start},
                 tolerance=scenario.simulation.tolerance,
             )
             cases.append((recording, role, experiment))
@@ -299,11 +299,13 @@ def _residuals(scenario: Scenario, found: SimulatedRecording) -> list[Residual]:
             continue
         simulated = found.simulated.select((name,)).resample(time[kept])[name]
         inputs = scenario.drive(recording).resample(time[kept])
+        with np.errstate(over="ignore"):
+            values = (simulated - recording.compared[name][kept]) / noise
         residuals.append(
             Residual(
                 found.name,
                 name,
-                (simulated - recording.compared[name][kept]) / noise,
+                values,
                 noise,
                 found.errors[name].unit,
                 {n: inputs[n] for n in inputs.names},

@@ -336,3 +336,53 @@ def test_a_one_sided_profile_says_so() -> None:
     found = profile(evaluate, np.array([0.5]), 0, 0.1, CHI2_95, PolishSettings())
     assert np.isnan(found.lower)
     assert found.upper == pytest.approx(0.5 + np.sqrt(CHI2_95) / 10.0, rel=1e-6)
+
+
+def jumpy(amplitude, jumps=0.0):
+    """A model of two parameters, 3000 samples, whose solver steps otherwise for every vector; its exact Jacobian.
+
+    ``amplitude``: of what that does to each sample, in noise; ``jumps``: share of the vectors that err by 30 in some.
+    """
+    t = np.linspace(0.0, 6.0, 3000)
+    noise = np.random.default_rng(5).normal(0.0, 1.0, t.size)
+
+    def model(x: np.ndarray) -> np.ndarray:
+        return 20.0 * x[0] * np.sin(t) + 8.0 * np.exp(-(0.5 + x[1]) * t)
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        rng = np.random.default_rng(np.frombuffer(x.tobytes(), dtype=np.uint32))
+        found = model(x) - model(np.array([0.4, 0.6])) - noise + amplitude * rng.normal(0.0, 1.0, t.size)
+        if rng.random() < jumps:
+            found[rng.integers(0, 2900) :][:60] += 30.0
+        return found
+
+    slopes = np.column_stack((20.0 * np.sin(t), -8.0 * t * np.exp(-1.1 * t)))
+    return lambda vectors: [residual(x) for x in vectors], slopes
+
+
+@pytest.mark.parametrize(("amplitude", "jumps"), [(0.0, 0.0), (0.02, 0.0), (1e-3, 0.2)])
+def test_the_noise_of_a_solver_costs_no_standard_error(amplitude: float, jumps: float) -> None:
+    evaluate, slopes = jumpy(amplitude, jumps)
+    found = polish(evaluate, np.array([0.41, 0.58]), PolishSettings())
+    assert found.residual is not None
+    assert found.jacobian is not None
+    assert found.jacobian_error is not None
+    groups = [[slice(0, 3000)]]
+    sure = estimate_uncertainty(
+        found.best, found.residual, found.jacobian, found.jacobian_error, groups, ["a", "b"]
+    )
+    assert sure.reasons == ("", "")
+    exact = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    assert sure.stderr == pytest.approx(exact, rel=0.25)
+
+
+def test_a_slope_that_the_noise_of_the_solver_hides_is_said_to_be_hidden() -> None:
+    evaluate, _ = jumpy(20.0)
+    found = polish(evaluate, np.array([0.41, 0.58]), PolishSettings())
+    assert found.residual is not None
+    assert found.jacobian is not None
+    assert found.jacobian_error is not None
+    sure = estimate_uncertainty(
+        found.best, found.residual, found.jacobian, found.jacobian_error, [[slice(0, 3000)]], ["a", "b"]
+    )
+    assert all("solver noise" in reason for reason in sure.reasons)

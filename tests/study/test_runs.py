@@ -2,9 +2,11 @@
 
 import errno
 import random
+import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -160,21 +162,27 @@ def test_a_full_disk_names_the_folder_and_tears_nothing(
         assert log.known(b"m" * 16) is None
 
 
-def test_large_outcomes_are_kept_as_far_as_that_is_cheaper(
+def test_large_outcomes_are_kept_as_far_as_the_disk_has_room(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runs, "BASE", 10_000)
-    monkeypatch.setattr(runs, "PER_SECOND", 100_000)
-    large = Outcome(Status.OK, reduced=np.zeros(1000), duration_s=1e-3)
-    with RunLog.open(tmp_path / RUNS) as log:
-        for k in range(10):
-            log.append(bytes([k]) * 16, large)
-        assert len(log) == 1
-        log.append(b"t" * 16, replace(large, duration_s=1.0))
-        log.append(b"u" * 16, large)
-        assert len(log) == 3
-        log.append(b"v" * 16, Outcome(Status.OK, reduced=np.zeros(5)))
-        assert log.known(b"v" * 16) is not None
+    large, small = Outcome(Status.OK, reduced=np.zeros(1000)), Outcome(Status.OK, reduced=np.zeros(5))
+
+    def kept(free: int) -> int:
+        monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
+        with RunLog.open(tmp_path / RUNS) as log:
+            before = len(log)
+            for k in range(10):
+                log.append(bytes([before + k]) * 16, large)
+            found = len(log) - before
+            log.append(bytes([100 + before]) * 16, small)
+            assert log.known(bytes([100 + before]) * 16) is not None
+            return found
+
+    assert kept(4 * 30_000) == 3
+    assert kept(4 * 20_000) == 2  # what is there already is not counted against it
+    assert kept(0) == 0
+    monkeypatch.setattr(runs, "LARGEST", (tmp_path / RUNS).stat().st_size + 9_000)
+    assert kept(10**12) == 1
 
 
 def test_only_what_is_not_known_is_run(tmp_path: Path, experiment: Experiment) -> None:

@@ -16,13 +16,13 @@ import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.local import LocalRunner
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.runner import OnOutcome, check_experiment, check_jobs, wrapper_names
+from thsa_cosim.closing import Closing
 from thsa_cosim.errors import FmuError, MachineError, MissingExtraError, StudyError
 from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.scratch import ScratchFolder
@@ -45,7 +45,7 @@ class Parcel:
     """Keyword arguments of LocalRunner."""
 
 
-class ClusterRunner:
+class ClusterRunner(Closing):
     """Runs batches on the Dask cluster at ``address``; see ``Runner``."""
 
     def __init__(
@@ -169,14 +169,6 @@ class ClusterRunner:
             self._client.run(close_study, self._parcel.digest, on_error="ignore")
         with contextlib.suppress(Exception):
             self._client.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _describe(

@@ -14,10 +14,10 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import BinaryIO, Self
+from typing import BinaryIO
 
 from thsa_cosim.batch.outcome import Status
+from thsa_cosim.closing import Closing
 from thsa_cosim.errors import InputError
 
 
@@ -38,7 +38,7 @@ class JournalRow:
     reason: str = ""
 
 
-class Journal:
+class Journal(Closing):
     """Append-only table of evaluated vectors; a context manager.
 
     Rows are in the file, and on the disk, when ``append`` returns. A last line that a kill or a power
@@ -106,14 +106,6 @@ class Journal:
     def close(self) -> None:
         """Close the file and release its lock."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     # -- file -----------------------------------------------------------------------------------------
     @property

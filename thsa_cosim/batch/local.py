@@ -5,8 +5,7 @@ import time
 import weakref
 from collections.abc import Sequence
 from dataclasses import replace
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
@@ -19,6 +18,7 @@ from thsa_cosim.batch.process import Progress, WorkerProcess
 from thsa_cosim.batch.runner import OnOutcome, check_jobs, wrapper_names
 from thsa_cosim.batch.study import Study
 from thsa_cosim.batch.worker import LOST
+from thsa_cosim.closing import Closing
 from thsa_cosim.errors import ParameterError, StudyError
 from thsa_cosim.fmu.machine import temporary_fault
 from thsa_cosim.fmu.plant import Backend, Kind, Reuse, Stepping
@@ -39,7 +39,7 @@ _AHEAD = 32
 """A worker has at hand what keeps it busy for _AHEAD_S, at most _AHEAD orders."""
 
 
-class LocalRunner:
+class LocalRunner(Closing):
     """Worker processes with one live FMU instance each; see ``Runner``.
 
     A run that crashes, exits, hangs, outgrows its memory or floods its output costs its worker at most: the
@@ -157,14 +157,6 @@ class LocalRunner:
     def close(self) -> None:
         """Stop the workers and remove all folders; safe to call twice."""
         self._finalizer()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     # -- staff ----------------------------------------------------------------------------------------
     def _staff(self, wanted: int, fresh: int = 0) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ from thsa_cosim.diagnosis.fitting.uncertainty import standard_errors
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import ChannelError, Comparison, DiagnosisResult, EmpiricalLaw
 from thsa_cosim.errors import StudyError
-from thsa_cosim.export.compile import this_platform
+from thsa_cosim.export.compile import native_platform
 from thsa_cosim.identify import ForceBalance, force_balance
 from thsa_cosim.scenario import DiagnoseSpec, Scenario
 from thsa_cosim.study import Comparison as Compared
@@ -81,14 +82,15 @@ def _diagnose(
     """Everything after the folder was claimed."""
     say = study.place.say
     cases = [t.case for t in trials if t.part == "fit"]
+    opening = partial(study.open_runner, scenario.simulation)
     tested: Superset | BlackBox
     if spec.model is None:
         say("measuring the drive of the black box")
-        box = tested = wrap_black_box(scenario, cases, effects)
+        box = tested = wrap_black_box(scenario, cases, effects, opening)
         declared = driven = with_wrapper(trials, tested.wrapper)
     else:
         say("exporting the superset of all effects")
-        box, tested = None, open_superset(scenario, spec.model, cases, effects, study.folder / WORK)
+        box, tested = None, open_superset(scenario, spec.model, cases, effects, study.folder / WORK, opening)
         declared, driven = trials, with_fmu(trials, tested.fmu)
     say("identifying the declared model from the drawing")
     before = identify_model(
@@ -175,10 +177,10 @@ class _Closing:
             if terms is not None and self.spec.empirical:
                 # The share stays that of the effects: a law describes and explains nothing.
                 model, extended, after = self._with_law(terms)
-        if model is not None and extended is not None and (here := this_platform()):
+        if model is not None and extended is not None:
             notes.append(
-                f"{extended.name} is for {here[0]} only; thsa-cosim export {model} --package {self.spec.package}"
-                f" -o {extended} compiles it for all platforms"
+                f"{extended.name} is for {native_platform().fmi3} only; thsa-cosim export {model}"
+                f" --package {self.spec.package} -o {extended} compiles it for all platforms"
             )
         counts = dict(self.bench.failures)
         changed = after is not before
@@ -224,6 +226,7 @@ class _Closing:
             failures=counts,
             notes=tuple(notes),
             data=self.scenario.data,
+            asked=scenario.table.model_dump(mode="json", by_alias=True, exclude_unset=True),
         )
 
     def _declared(self) -> Identified:

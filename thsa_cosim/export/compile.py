@@ -63,12 +63,6 @@ FLAGS = (
 KEPT = 64
 
 
-def this_platform() -> tuple[str, ...] | None:
-    """What to compile for to run here, as FMI 2.0 names it; None (all) on a machine that is not known."""
-    here = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}.get(sys.platform)
-    return (here,) if here else None
-
-
 def compile_library(folder: Path, sources: Sequence[str], platform: Platform, output: Path) -> None:
     """Compile ``sources`` of ``folder`` to a shared library for ``platform``, unless it was compiled before.
 

@@ -4,11 +4,11 @@ import importlib
 import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import numpy as np
 
+from thsa_cosim.closing import Closing
 from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.description import FmuDescription, read_description
@@ -35,7 +35,7 @@ _PLANS = 64
 _log = logging.getLogger(__name__)
 
 
-class Plant:
+class Plant(Closing):
     """An opened FMU: owns its unpacked folder and at most one live instance.
 
     Use it as a context manager. It is not safe against an FMU that crashes or hangs: runners put it into
@@ -256,7 +256,7 @@ class Plant:
         exact = plan.mode in ("derivative", "intermediate")
         free = self.stepping == "free" and exact and is_offered(instance)
         if free:
-            tolerance = solver_tolerance(instance, tolerance)
+            tolerance = solver_tolerance(instance, plan, tolerance)
         instance.initialize_begin(start, stop, tolerance)
         instance.set_values(plan.input_channels, plan.first)
         instance.initialize_end()
@@ -334,14 +334,6 @@ class Plant:
         self._plans.clear()
         if self._scratch is not None:
             self._scratch.remove()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _default_backend() -> Backend:

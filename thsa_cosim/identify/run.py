@@ -185,6 +185,8 @@ class _Search:
 
     def validate(self, engine: Engine) -> None:
         """Score the held-out recordings with what was found."""
+        if not self._held_out:
+            return
         results, laws = self._results(), self._laws()[0]
         space = self._scenario.parameters
         shared = [p.name for p in space.parameters]

@@ -81,7 +81,8 @@ def base_step(distances: FloatArray) -> float:
     usual = float(np.median(distances))
     short = float(np.quantile(distances, 0.1))
     for step in (short, float(np.median(distances[distances < 1.5 * short]))):
-        multiples = distances / step
+        with np.errstate(over="ignore", invalid="ignore"):
+            multiples = distances / step
         fitting = np.abs(multiples - np.round(multiples)) < 0.05
         if step < 0.7 * usual and np.mean(fitting) > 0.95:
             return step

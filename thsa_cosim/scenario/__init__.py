@@ -7,7 +7,7 @@ that the use cases get, ``load`` turns the one into the other, ``check`` holds a
 The ``tune_`` modules are the same for tunings, which need no recordings.
 """
 
-from thsa_cosim.scenario.executor import Executor, OpenRunner
+from thsa_cosim.scenario.executor import Executor, Opening, OpenRunner
 from thsa_cosim.scenario.loading import AnyScenario, load
 from thsa_cosim.scenario.model import (
     BlackBoxSpec,
@@ -42,6 +42,7 @@ __all__ = [
     "ForceSpec",
     "LawTable",
     "OpenRunner",
+    "Opening",
     "Scenario",
     "SearchTable",
     "SimulationTable",

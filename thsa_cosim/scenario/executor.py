@@ -13,6 +13,8 @@ from thsa_cosim.scenario.schema import SimulationTable
 
 OpenRunner = Callable[[SimulationTable, Sequence[Experiment]], Runner]
 """Opens processes for experiments, as ``[simulation]`` wants them."""
+Opening = Callable[[Sequence[Experiment]], Runner]
+"""The same where ``[simulation]`` is settled."""
 
 
 def _dask(experiments: Sequence[Experiment], address: str, **limits: Any) -> Runner:

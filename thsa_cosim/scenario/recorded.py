@@ -93,6 +93,7 @@ def _resolve(
 ) -> Scenario:
     description = open_model(path, table, fmu)
     inputs, measured = check.roles(table, description)
+    started = check.started(table, description)
     parameters = check.parameters(table, description) if isinstance(table, IdentifyTable) else ()
     space = ParameterSpace(tuple(p for p, _ in parameters))
     fixed = check.fixed(path, table, description, space)
@@ -108,7 +109,7 @@ def _resolve(
         )
     if not files["fit"] and not (isinstance(table, SimulateTable) and files["validate"]):
         raise ScenarioError("recordings.fit names no recording; add one, or give it with --fit.")
-    read = _recordings(table, files, description, parts_held_out=not validate)
+    read = _recordings(table, files, description, started, parts_held_out=not validate)
     per_recording = [p.name for p, where in parameters if where == "recording"]
     scenario = Scenario(
         kind=table.kind,
@@ -149,6 +150,7 @@ def _recordings(
     table: CommonTable,
     files: Mapping[str, Sequence[Path]],
     description: FmuDescription,
+    started: Sequence[str],
     *,
     parts_held_out: bool,
 ) -> dict[str, tuple[Recording, ...]]:
@@ -164,11 +166,13 @@ def _recordings(
     found: dict[str, list[Recording]] = {"fit": [], "validate": []}
 
     def read(role: str, path: Path, axis: TimeAxis, name: str) -> None:
-        found[role].append(
-            read_recording(
-                path, columns, time=axis, units=units, temperature=temperature, name=name, driven=driven
-            )
-        )
+        recording = read_recording(
+            path, columns, time=axis, units=units, temperature=temperature, name=name, driven=driven
+        ).with_start(started)
+        for variable, value in recording.start.items():
+            where = f"{path}: recordings.columns.{variable}"
+            check.check_range(description.variables[variable], value, where, description)
+        found[role].append(recording)
 
     for role, paths in files.items():
         for path, name in named(paths):

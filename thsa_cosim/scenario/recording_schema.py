@@ -54,7 +54,8 @@ class ColumnTable(Table):
     """``[recordings.columns.<variable>]``: where a signal comes from.
 
     One table per FMU input and per measured output; every input of the FMU needs one. Whether a signal is driven or
-    compared follows from the FMU.
+    compared follows from the FMU. A parameter of the FMU takes the column's first value in each recording as its start
+    value: a gain that differs from run to run, the position in which a recording begins.
     """
 
     column: Name | None = None

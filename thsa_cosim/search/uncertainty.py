@@ -20,6 +20,9 @@ Group = Sequence[slice]
 
 PRIOR_SPREAD = 1.0 / np.sqrt(12.0)
 AT_BOUND = 1e-6
+SOLVER_NOISE = "this FMU's solver noise hides the slope of the signals by it"
+CLEAR = 0.1
+"""Singular value of a normalised Jacobian from which on columns are no near-combination of each other."""
 TAKES_PART = 0.1
 
 
@@ -91,20 +94,24 @@ def estimate_uncertainty(
     trust = np.linalg.norm(jacobian_error, axis=0)
     reasons = [""] * n
     for i in range(n):
-        if norms[i] <= trust[i] or norms[i] * PRIOR_SPREAD < 1e-6:
+        if norms[i] * PRIOR_SPREAD < 1e-6:
             reasons[i] = "no fitted signal responds to it"
+        elif norms[i] <= trust[i]:
+            reasons[i] = SOLVER_NOISE
     active = [i for i in range(n) if not reasons[i]]
     covariance = np.full((n, n), np.nan)
     bandwidths: list[int] = []
     if active:
         scaled = jacobian[:, active] / norms[active]
         doubt = float(np.linalg.norm(jacobian_error[:, active] / norms[active], ord=2))
-        inverse, shares = _inverse_information(scaled, slope, doubt)
+        inverse, shares, hidden = _inverse_information(scaled, slope, doubt)
         tied = [i for position, i in enumerate(active) if shares[position] > TAKES_PART**2]
         for i in tied:
             partners = " and ".join(names[j] for j in tied if j != i)
             together = f" with {partners}" if partners else ""
             reasons[i] = f"the fitted signals determine only a combination of it{together}"
+            if hidden[active.index(i)] > TAKES_PART**2:
+                reasons[i] = SOLVER_NOISE
         middle, white = np.zeros_like(inverse), np.zeros_like(inverse)
         for group in groups:
             for score in _scores(psi, scaled, group):
@@ -122,7 +129,7 @@ def estimate_uncertainty(
         scale = grow / norms[active]
         covariance[np.ix_(active, active)] = robust * np.outer(scale, scale)
     for i in range(n):
-        if "combination" in reasons[i]:
+        if "combination" in reasons[i] or reasons[i] == SOLVER_NOISE:
             covariance[i, :] = covariance[:, i] = np.nan
     stderr = np.sqrt(np.diag(covariance))
     for i in range(n):
@@ -135,8 +142,9 @@ def estimate_uncertainty(
 
 def _inverse_information(
     scaled: FloatArray, slope: FloatArray, doubt: float
-) -> tuple[FloatArray, FloatArray]:
-    """Pseudo-inverse of A (m, m), and each parameter's share (m,) of the directions left out.
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Pseudo-inverse of A (m, m), each parameter's share (m,) of the directions left out, and of those among them that
+    only the Jacobian's uncertainty hides.
 
     A direction counts as undetermined when its singular value is below three times the Jacobian's own
     uncertainty (Weyl's inequality bounds the effect of the one on the other), or below 1e-7.
@@ -147,7 +155,8 @@ def _inverse_information(
     kept = singular > max(3.0 * doubt, 1e-7)
     inverse = (directions[kept].T / singular[kept] ** 2) @ directions[kept]
     shares = np.sum(directions[~kept] ** 2, axis=0)
-    return inverse, shares
+    hidden = np.sum(directions[~kept & (singular > CLEAR)] ** 2, axis=0)
+    return inverse, shares, hidden
 
 
 def _scores(psi: FloatArray, scaled: FloatArray, group: Group) -> list[FloatArray]:

@@ -4,8 +4,9 @@ The file holds one record per run: a frame (length and checksum), the run's key,
 of all that decides the outcome: the FMU's archive, inputs, times, start values, solver settings, and what the worker
 makes of the signals. A kill tears the last record at most, which is dropped when the log is opened again.
 
-Large outcomes (signals, residuals) are kept only as far as that is cheaper than running again, see ``BASE`` and
-``PER_SECOND``. Timing apart, a recalled outcome is bit for bit the one that was returned.
+Outcomes are kept as far as the disk has room, see ``LARGEST`` and ``SHARE``: to write the residuals of a run takes a
+hundredth of simulating it. A diagnosis of a few long recordings comes to 0.3 to 1 GB; all of it goes when the study is
+complete. Timing apart, a recalled outcome is bit for bit the one that was returned.
 """
 
 import contextlib
@@ -13,23 +14,24 @@ import hashlib
 import json
 import os
 import pickle
+import shutil
 import struct
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, BinaryIO, Self
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Outcome, Runner, Status
 from thsa_cosim.batch.runner import OnOutcome
+from thsa_cosim.closing import Closing
 from thsa_cosim.errors import InputError, MachineError
 from thsa_cosim.signals import Signals
 
 RUNS = "runs.log"
-#: So many bytes may be kept in any case, and so many more for every second of simulation that is kept.
-BASE, PER_SECOND = 256_000_000, 1_000_000
+#: So many bytes may be kept at most, and this share of what the disk has left when the study is opened.
+LARGEST, SHARE = 4_000_000_000, 0.25
 #: Outcomes up to this size (cost terms, say) are always kept.
 SMALL = 2_000
 _MAGIC = b"thsa-cosim runs 1\n"
@@ -37,7 +39,7 @@ _FRAME = struct.Struct("<II")
 _KEY = 16
 
 
-class RunLog:
+class RunLog(Closing):
     """Outcomes by key, in a file that only grows; a context manager."""
 
     def __init__(self, path: Path, file: BinaryIO) -> None:
@@ -48,7 +50,7 @@ class RunLog:
         self._file = file
         self._at: dict[bytes, tuple[int, int]] = {}
         self._end = 0
-        self._seconds = 0.0
+        self._allowed = LARGEST
 
     @classmethod
     def open(cls, path: Path) -> "RunLog":
@@ -58,6 +60,7 @@ class RunLog:
             _lock(path, file)
             log = cls(path, file)
             log._load()
+            log._allowed = min(LARGEST, log._end + int(SHARE * shutil.disk_usage(path.parent).free))
         except BaseException:
             file.close()
             raise
@@ -75,15 +78,14 @@ class RunLog:
         return _decoded(os.pread(self._file.fileno(), found[1], found[0]))
 
     def append(self, key: bytes, outcome: Outcome) -> None:
-        """Keep an outcome, unless it is so large that running again is cheaper.
+        """Keep an outcome; a large one as far as there is room, for it can be simulated again.
 
         MachineError if it cannot be written; the log is then as it was before. A machine's fault is no outcome.
         """
         if outcome.status is Status.MACHINE:
             return
         size = sum(a.nbytes for a in _arrays(outcome))
-        allowed = BASE + PER_SECOND * (self._seconds + outcome.duration_s)
-        if key in self._at or (size > SMALL and self._end + size > allowed):
+        if key in self._at or (size > SMALL and self._end + size > self._allowed):
             return
         content = _encoded(outcome)
         record = key + content
@@ -100,7 +102,6 @@ class RunLog:
             ) from None
         self._end = begin + _FRAME.size + len(record)
         self._at[key] = (self._end - len(content), len(content))
-        self._seconds += outcome.duration_s
 
     def remove(self) -> None:
         """Remove the file: the study is complete."""
@@ -110,14 +111,6 @@ class RunLog:
     def close(self) -> None:
         """Close the file and release its lock."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _load(self) -> None:
         size = os.fstat(self._file.fileno()).st_size
@@ -140,12 +133,11 @@ class RunLog:
                 start = self._end + _FRAME.size + _KEY
                 self._at[record[:_KEY]] = (start, length - _KEY)
                 self._end = start + length - _KEY
-                self._seconds += _meta(record[_KEY:])[0]["duration_s"]
         if self._end < size:
             self._file.truncate(self._end)
 
 
-class LoggedRunner:
+class LoggedRunner(Closing):
     """A runner whose outcomes are kept in a log and looked up there; see ``Runner``."""
 
     def __init__(self, runner: Runner, log: RunLog, experiments: Sequence[Experiment], settings: Any) -> None:
@@ -182,14 +174,6 @@ class LoggedRunner:
     def close(self) -> None:
         """Close the runner; the log stays open."""
         self._runner.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 # -- keys ---------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from thsa_cosim.diagnosis.catalogue.candidate import Candidate, candidates_of
 from thsa_cosim.diagnosis.catalogue.effect import Effect
 from thsa_cosim.errors import StudyError
 from thsa_cosim.fmu import FmuDescription
-from thsa_cosim.scenario import BlackBoxSpec, Executor, Scenario, SimulationTable
+from thsa_cosim.scenario import BlackBoxSpec, Opening, Scenario
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.study import Case
 
@@ -32,7 +32,9 @@ class BlackBox:
     signals_at: Callable[[Mapping[str, Mapping[str, float]]], Mapping[str, Signals]]
 
 
-def wrap_black_box(scenario: Scenario, cases: Sequence[Case], effects: Iterable[Effect]) -> BlackBox:
+def wrap_black_box(
+    scenario: Scenario, cases: Sequence[Case], effects: Iterable[Effect], open_: Opening
+) -> BlackBox:
     """Wrap the scenario's FMU so that every effect that fits can be put on; all are neutral.
 
     The drive is measured along the fit recordings ``cases``.
@@ -43,9 +45,9 @@ def wrap_black_box(scenario: Scenario, cases: Sequence[Case], effects: Iterable[
     spec, effects = scenario.diagnose.blackbox, tuple(effects)
     assert spec is not None
     observed = _outputs(spec)
-    runs = _simulate(scenario.fmu, cases, observed, scenario.simulation)
+    runs = _simulate(scenario.fmu, cases, observed, open_)
     first = next(case for case in cases if case.name in runs)
-    drive = _measured(spec, scenario.fmu, first, runs[first.name], scenario.simulation)
+    drive = _measured(spec, scenario.fmu, first, runs[first.name], open_)
     places = find_places(spec, drive.has_torque)
     slots = tuple(slot_of(place, spec, scenario.fmu) for place in places)
     scales = {
@@ -60,7 +62,7 @@ def wrap_black_box(scenario: Scenario, cases: Sequence[Case], effects: Iterable[
         wrapped = [replace(c, wrapper=wrapper, fixed={**c.fixed, **values[c.name]}) for c in cases]
         return {
             name: Signals(run.time, _positions(spec, run))
-            for name, run in _simulate(scenario.fmu, wrapped, observed, scenario.simulation).items()
+            for name, run in _simulate(scenario.fmu, wrapped, observed, open_).items()
         }
 
     return BlackBox(wrapper, slots, candidates, _notes(spec, drive, effects, candidates), signals_at)
@@ -89,11 +91,11 @@ def _outputs(spec: BlackBoxSpec) -> tuple[str, ...]:
 
 
 def _simulate(
-    fmu: FmuDescription, cases: Sequence[Case], outputs: tuple[str, ...], simulation: SimulationTable
+    fmu: FmuDescription, cases: Sequence[Case], outputs: tuple[str, ...], open_: Opening
 ) -> dict[str, Signals]:
     """The outputs of every case that can be simulated, by name; StudyError if none can."""
     experiments: list[Experiment] = [replace(c.experiment(c.name, None), outputs=outputs) for c in cases]
-    with Executor().open_runner(simulation, experiments) as runner:
+    with open_(experiments) as runner:
         outcomes = runner.run([Job(e.name) for e in experiments])
     found = {
         e.name: o.signals
@@ -107,15 +109,13 @@ def _simulate(
     return found
 
 
-def _measured(
-    spec: BlackBoxSpec, fmu: FmuDescription, case: Case, base: Signals, simulation: SimulationTable
-) -> Drive:
+def _measured(spec: BlackBoxSpec, fmu: FmuDescription, case: Case, base: Signals, open_: Opening) -> Drive:
     step, stepped = 0.0, None
     if spec.load is not None:
         load = case.inputs[spec.load]
         step = STEP * (float(np.max(np.abs(load))) or 1.0)
         moved = replace(case, inputs=case.inputs.with_values({spec.load: load + step}))
-        stepped = _simulate(fmu, [moved], base.names, simulation)[case.name]
+        stepped = _simulate(fmu, [moved], base.names, open_)[case.name]
     return measure_drive(spec, case.inputs, base, stepped, step)
 
 

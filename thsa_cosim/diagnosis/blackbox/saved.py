@@ -4,9 +4,9 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from thsa_cosim.closing import Closing
 from thsa_cosim.diagnosis.blackbox.drive import Drive
 from thsa_cosim.diagnosis.blackbox.wrapper import EffectWrapper, Term
 from thsa_cosim.errors import ScenarioError
@@ -62,7 +62,7 @@ def _term(content: Mapping[str, Any]) -> Term:
     return Term(**rest, starts=content["parameters"])
 
 
-class WrappedPlant:
+class WrappedPlant(Closing):
     """An FMU with the effects that a diagnosis put around it; used like `Plant`, as a context manager."""
 
     def __init__(self, plant: Plant, wrapper: EffectWrapper) -> None:
@@ -93,11 +93,3 @@ class WrappedPlant:
     def close(self) -> None:
         """Close the FMU."""
         self.plant.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

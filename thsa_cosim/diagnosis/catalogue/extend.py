@@ -11,7 +11,7 @@ from pathlib import Path
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.catalogue.slots import INPUTS, OUTPUTS, Slot
 from thsa_cosim.export import export_fmu
-from thsa_cosim.export.compile import this_platform
+from thsa_cosim.export.compile import native_platform
 
 #: Extended models are named after their own class; the system model of the shipped package goes by the package's name.
 KNOWN_AS = {"THSA.Actuator": "THSA"}
@@ -85,7 +85,7 @@ def write_extended_model(
     source = extended_class(name, base, candidates, values, f"{base} with: {titles}")
     file = write_extended(folder, name, source)
     fmu = folder / f"{name}.fmu"
-    return file, export_fmu(str(file), package=package, output=fmu, platforms=this_platform())
+    return file, export_fmu(str(file), package=package, output=fmu, platforms=(native_platform().fmi3,))
 
 
 def qualified(model: str, package: Path) -> str:

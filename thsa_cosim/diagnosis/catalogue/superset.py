@@ -16,9 +16,9 @@ from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, wri
 from thsa_cosim.diagnosis.catalogue.slots import SCALES, Slot, find_slots
 from thsa_cosim.errors import StudyError
 from thsa_cosim.export import export_fmu
-from thsa_cosim.export.compile import this_platform
+from thsa_cosim.export.compile import native_platform
 from thsa_cosim.fmu import read_description
-from thsa_cosim.scenario import Executor, Scenario, SimulationTable
+from thsa_cosim.scenario import Opening, Scenario
 from thsa_cosim.signals import Signals
 from thsa_cosim.study import Case, export_digest, is_made_from, note_made_from
 
@@ -37,7 +37,12 @@ class Superset:
 
 
 def open_superset(
-    scenario: Scenario, model: str, cases: Sequence[Case], effects: Iterable[Effect], folder: Path
+    scenario: Scenario,
+    model: str,
+    cases: Sequence[Case],
+    effects: Iterable[Effect],
+    folder: Path,
+    open_: Opening,
 ) -> Superset:
     """Export the superset of ``model`` and measure its scales on the fit recordings ``cases``.
 
@@ -46,10 +51,8 @@ def open_superset(
     assert scenario.diagnose is not None
     fmu, slots, chosen = build_superset(model, scenario.diagnose.package, effects, folder)
     own = [replace(case, fmu=fmu) for case in cases]
-    candidates = candidates_of(chosen, slots, scales_of(fmu, slots, own, scenario.simulation))
-    return Superset(
-        fmu, slots, candidates, lambda values: slot_signals(slots, own, values, scenario.simulation)
-    )
+    candidates = candidates_of(chosen, slots, scales_of(fmu, slots, own, open_))
+    return Superset(fmu, slots, candidates, lambda values: slot_signals(slots, own, values, open_))
 
 
 def build_superset(
@@ -61,7 +64,7 @@ def build_superset(
     name = qualified(model, package).replace(".", "_") + "_superset"
     source = extended_class(name, qualified(model, package), candidates, description="All effects, neutral")
     fmu = folder / f"{name}.fmu"
-    platforms = this_platform()
+    platforms = (native_platform().fmi3,)
     made_from = export_digest(source, package, platforms)
     if not is_made_from(fmu, made_from):
         file = write_extended(folder, name, source)
@@ -71,7 +74,7 @@ def build_superset(
 
 
 def scales_of(
-    fmu: Path, slots: Sequence[Slot], cases: Sequence[Case], simulation: SimulationTable
+    fmu: Path, slots: Sequence[Slot], cases: Sequence[Case], open_: Opening
 ) -> dict[str, dict[str, float]]:
     """How large speed, position, load … are in each slot over the recordings, in the slot's units.
 
@@ -84,7 +87,7 @@ def scales_of(
     known = read_description(fmu).variables
     outputs = tuple(dict.fromkeys(v for v in wanted.values() if v in known))
     experiments = [_with_outputs(case, outputs) for case in cases]
-    with Executor().open_runner(simulation, experiments) as runner:
+    with open_(experiments) as runner:
         outcomes = runner.run([Job(e.name) for e in experiments])
     runs = [o.signals for o in outcomes if o.status == Status.OK and o.signals is not None]
     if not runs:
@@ -120,13 +123,13 @@ def slot_signals(
     slots: Sequence[Slot],
     cases: Sequence[Case],
     values: Mapping[str, Mapping[str, float]],
-    simulation: SimulationTable,
+    open_: Opening,
 ) -> dict[str, Signals]:
     """Inputs of every friction slot over each recording, by case name, at the given start values per case."""
     outputs = tuple(
         f"{s.component}.{v}" for s in slots if s.interface == "FrictionEffect" for v in ("v", "z", "N")
     )
     experiments = [_with_outputs(case, outputs) for case in cases]
-    with Executor().open_runner(simulation, experiments) as runner:
+    with open_(experiments) as runner:
         outcomes = runner.run([Job(c.name, values[c.name]) for c in cases])
     return {c.name: o.signals for c, o in zip(cases, outcomes, strict=True) if o.signals is not None}

@@ -7,6 +7,7 @@ A law is a description: it gets no effect's name.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
@@ -23,7 +24,7 @@ from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import EmpiricalLaw, EmpiricalTerm
 from thsa_cosim.export import export_fmu
-from thsa_cosim.export.compile import this_platform
+from thsa_cosim.export.compile import native_platform
 from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
 
 #: At most so many terms: a law of more says no more than a plot.
@@ -88,10 +89,12 @@ class LawSearch:
             str(file),
             package=self.spec.package,
             output=self.folder / f"{name}.fmu",
-            platforms=this_platform(),
+            platforms=(native_platform().fmi3,),
         )
         trials = with_fmu(self.trials, fmu)
-        scales = scales_of(fmu, slots, [t.case for t in trials if t.part == "fit"], simulation)
+        scales = scales_of(
+            fmu, slots, [t.case for t in trials if t.part == "fit"], partial(self.open_runner, simulation)
+        )
         candidates = candidates_of((EMPIRICAL,), slots, scales)
         with self.open_runner(simulation, [t.experiment for t in trials]) as runner:
             bench = Bench(runner, trials)

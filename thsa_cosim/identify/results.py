@@ -9,7 +9,7 @@ from thsa_cosim.laws import Doubt, Law
 from thsa_cosim.search import Generation, LocalSearch
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.ssv import ParameterSet
-from thsa_cosim.study import ChannelError, Comparison
+from thsa_cosim.study import ChannelError, Comparison, CouplingError
 
 
 @dataclass(frozen=True)
@@ -144,3 +144,5 @@ class IdentifyResult:
     """What is to be known about the recordings."""
     trust: Trust = field(default_factory=lambda: Trust("explained"))
     """Whether the fit leaves nothing but noise."""
+    coupling: CouplingError | None = None
+    """What the steps of a system's components cost at the estimate; None where nothing is coupled by steps."""

@@ -47,6 +47,7 @@ def identify_to_dict(result: IdentifyResult) -> dict[str, Any]:
             "data": result.data.to_dict(),
             "trust": result.trust.to_dict(),
             "notes": list(result.notes),
+            **({} if result.coupling is None else {"coupling": result.coupling.to_dict()}),
         }
     )
     return content

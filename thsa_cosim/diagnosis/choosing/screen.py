@@ -6,8 +6,8 @@ residuals that the candidate's best combination promises (the score test, Rao 19
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -15,10 +15,13 @@ from scipy.linalg import cho_factor, cho_solve
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import RESPONSE, Fit
-from thsa_cosim.diagnosis.fitting.unknowns import Unknown
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 from thsa_cosim.signals import FloatArray
 
 _WANTED = 3.0 * RESPONSE
+_AT_ONCE = 2**29
+"""Bytes of residuals that are held before they become responses of half the size."""
+_ROWS = 100_000
 #: Left of a response after orthogonalisation (as a share of its square) below which nothing can be said.
 TESTABLE = 1e-6
 
@@ -52,6 +55,11 @@ class Proposal:
     def is_testable(self) -> bool:
         """Whether it would do anything to the fit recordings, whatever declared parameters can imitate."""
         return bool(np.isfinite(self.response).all() and np.any(self.precision))
+
+    @property
+    def summary(self) -> "Proposal":
+        """The same without its response, which takes megabytes."""
+        return replace(self, response=np.empty((0, self.response.shape[1])))  # a slice would keep it
 
     @property
     def label(self) -> str:
@@ -119,7 +127,7 @@ def propose(bench: Bench, base: Fit, rows: Sequence[tuple[Candidate, Mapping[str
             vector[index[variable]] += step
         again = []
         for (r, variable, step, at), residual in zip(
-            columns, bench.residuals(unknowns, vectors, "fit"), strict=True
+            columns, _in_batches(bench, unknowns, vectors, base.residual.size), strict=True
         ):
             if residual is None:
                 again.append((r, variable, 0.1 * step, at))
@@ -134,10 +142,19 @@ def propose(bench: Bench, base: Fit, rows: Sequence[tuple[Candidate, Mapping[str
             break
     proposals, orthogonal = [], Orthogonal(base)
     for r, (candidate, shapes) in enumerate(rows):
-        responses = [found.get((r, p.variable)) for p in candidate.coefficients]
+        responses = [found.pop((r, p.variable), None) for p in candidate.coefficients]
         if all(response is not None for response in responses):
             proposals.append(_propose(base, orthogonal, candidate, shapes, np.stack(responses, axis=1)))  # type: ignore[arg-type]
     return sorted(proposals, key=lambda p: -p.gain)
+
+
+def _in_batches(
+    bench: Bench, unknowns: Unknowns, vectors: FloatArray, size: int
+) -> Iterator[FloatArray | None]:
+    """The residuals of each vector; of long recordings only as many at a time as memory should hold."""
+    count = max(1, _AT_ONCE // (8 * size))
+    for first in range(0, len(vectors), count):
+        yield from bench.residuals(unknowns, vectors[first : first + count], "fit")
 
 
 class Orthogonal:
@@ -154,6 +171,18 @@ class Orthogonal:
     def remaining(self, response: FloatArray) -> FloatArray:
         """``response`` (N, k) less what the unknowns imitate."""
         return np.asarray(response - self._jacobian @ self.project(response).astype(np.float32))
+
+    def products(self, responses: Sequence[FloatArray]) -> FloatArray:
+        """(K, K) products of what remains of ``responses`` (N, k) each, side by side; a block of rows at a time."""
+        moves = [self.project(response).astype(np.float32) for response in responses]
+        count = sum(move.shape[1] for move in moves)
+        found = np.zeros((count, count))
+        for first in range(0, self._jacobian.shape[0], _ROWS):
+            rows = slice(first, first + _ROWS)
+            left = [r[rows] - self._jacobian[rows] @ m for r, m in zip(responses, moves, strict=True)]
+            block = np.concatenate(left, axis=1)
+            found += block.T @ block
+        return found
 
 
 def _propose(

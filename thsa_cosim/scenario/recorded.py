@@ -13,6 +13,7 @@ from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Column, Recording, TimeAxis, read_recording
 from thsa_cosim.scenario import check
 from thsa_cosim.scenario.files import expand, named
+from thsa_cosim.scenario.law_search import with_laws
 from thsa_cosim.scenario.model import Scenario, TemperaturePoint
 from thsa_cosim.scenario.recording_schema import TemperatureTable
 from thsa_cosim.scenario.schema import (
@@ -110,6 +111,7 @@ def _resolve(
     if not files["fit"] and not (isinstance(table, SimulateTable) and files["validate"]):
         raise ScenarioError("recordings.fit names no recording; add one, or give it with --fit.")
     read = _recordings(table, files, description, started, parts_held_out=not validate)
+    space = with_laws(table, space, read["fit"])
     per_recording = [p.name for p, where in parameters if where == "recording"]
     scenario = Scenario(
         kind=table.kind,
@@ -197,7 +199,7 @@ def _points(
     """Group recordings by rounded temperature, coldest first, or all of them together."""
 
     def rounded(recording: Recording) -> float | None:
-        if temperature is None or temperature.group == "joint" or recording.temperature_degC is None:
+        if temperature is None or temperature.group != "point" or recording.temperature_degC is None:
             return None
         return round(recording.temperature_degC / temperature.round_to) * temperature.round_to + 0.0
 

@@ -83,7 +83,7 @@ def base_step(distances: FloatArray) -> float:
     for step in (short, float(np.median(distances[distances < 1.5 * short]))):
         with np.errstate(over="ignore", invalid="ignore"):
             multiples = distances / step
-        fitting = np.abs(multiples - np.round(multiples)) < 0.05
+            fitting = np.abs(multiples - np.round(multiples)) < 0.05
         if step < 0.7 * usual and np.mean(fitting) > 0.95:
             return step
     return usual

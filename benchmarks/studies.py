@@ -5,10 +5,12 @@
 Each scenario runs from the import to the page, in a process of its own with one worker, as its command does. Printed
 per study, in CPU seconds: all of it; import; the parent (search, linear algebra, journal); workers; the report
 (tables, pictures, page); export; and the bare FMU: as many simulations as the study had, each as long as one
-takes alone in a compiled process. ``total/FMU`` is the first over the last. Of motor, screw and gearbox,
+takes alone in a compiled process. ``total/FMU`` is the first over the last; ``search/FMU`` leaves out import, report,
+and what it takes to start a Python with NumPy for the worker. Of motor, screw and gearbox,
 `script_least_squares.py` then identifies the first ``--script-points`` temperatures from the same arrays;
 ``script/ours`` compares CPU seconds per temperature, ours with everything included, and ``cost`` says by how
-much the script's final cost lies above ours.
+much the script's final cost lies above ours. Of tunings with one set of gains, `script_tuning.py` searches until it
+has our final cost. EMPS needs DATA_EMPS.mat in ``../shared/emps``.
 """
 
 import argparse
@@ -38,12 +40,20 @@ COMMANDS = {
     "actuator": "identify",
     "feedforward": "tune",
     "schedule": "tune",
+    "system": "tune",
+    "system_sampled": "tune",
+    "emps": "identify",
 }
+EMPS = HERE.parent.parent / "shared" / "emps" / "DATA_EMPS.mat"
+#: Scenarios beside which a script runs.
+IDENTIFIED, TUNED = ("motor", "screw", "gearbox"), ("table4", "feedforward")
 #: What counts as report, and as export: functions by the room they are in.
 REPORT = (
     ("thsa_cosim.report.identify.files", "write_identify"),
     ("thsa_cosim.report.tune.files", "write_tune"),
     ("thsa_cosim.report.diagnose.result", "write_diagnosis"),
+    ("thsa_cosim.report.simulate.files", "write_simulate"),
+    ("thsa_cosim.report.staged", "write_staged"),
     ("thsa_cosim.report.page.write", "write_page"),
 )
 EXPORT = (("thsa_cosim.export", "export_fmu"),)
@@ -63,13 +73,40 @@ def one(name: str, folder: Path) -> dict[str, Any]:
     for part, places in (("report", REPORT), ("export", EXPORT)):
         for module, function in places:
             _clocked(module, function, part, spent)
+    runs = _counted()
+    data = ["--fit", str(EMPS)] if name == "emps" else []
     code = run_command(
-        [COMMANDS[name], str(SCENARIOS / f"{name}.toml"), "-o", str(folder), "--workers", "1", "--quiet"]
+        [
+            COMMANDS[name],
+            str(SCENARIOS / f"{name}.toml"),
+            *data,
+            "-o",
+            str(folder),
+            "--workers",
+            "1",
+            "--quiet",
+        ]
     )
     own, children = (resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     whole, workers = own.ru_utime + own.ru_stime, children.ru_utime + children.ru_stime
     parent = whole - imported - spent["report"] - spent["export"]
-    return {"code": code, "import": imported, "parent": parent, "workers": workers, **spent}
+    return {
+        "code": code, "runs": runs[0], "import": imported, "parent": parent, "workers": workers, **spent
+    }  # fmt: skip
+
+
+def _counted() -> list[int]:
+    """Count the simulations that local workers are given from now on."""
+    from thsa_cosim.batch.local import LocalRunner
+
+    runs, inner = [0], LocalRunner.run
+
+    def run(self: LocalRunner, jobs: Any, on_outcome: Any = None) -> Any:
+        runs[0] += len(jobs)
+        return inner(self, jobs, on_outcome)
+
+    LocalRunner.run = run  # type: ignore[method-assign]
+    return runs
 
 
 def _clocked(module: str, function: str, part: str, spent: dict[str, float]) -> None:
@@ -139,7 +176,7 @@ def _points(name: str) -> Any:
     from thsa_cosim.identify.problem import build_point
     from thsa_cosim.scenario import StagedScenario, load
 
-    study = load(SCENARIOS / f"{name}.toml")
+    study = load(SCENARIOS / f"{name}.toml", **({"fit": [EMPS]} if name == "emps" else {}))
     parts = [s.scenario for s in study.stages] if isinstance(study, StagedScenario) else [study]
     for scenario in parts:
         yield scenario, [build_point(scenario, p) for p in scenario.points]
@@ -190,8 +227,11 @@ def task(name: str, count: int) -> list[dict[str, Any]]:
     return found
 
 
-def measure(name: str, output: Path, script_points: int) -> None:
+def measure(name: str, output: Path, script_points: int, start_s: float) -> None:
     """Print one line of the table, and the comparison with the script where there is one."""
+    if name == "emps" and not EMPS.exists():
+        print(f"{name:12s} left out: {EMPS} is not there")
+        return
     folder = output / name
     begin = time.perf_counter()
     done = subprocess.run(
@@ -205,16 +245,47 @@ def measure(name: str, output: Path, script_points: int) -> None:
         print(f"{name}: {done.stderr.strip().splitlines()[-1:]}")
         return
     spent = json.loads(done.stdout.splitlines()[-1])
-    result = json.loads((folder / "result.json").read_text())
-    runs, each = result["evaluations"], bare(name)
+    result, each = json.loads((folder / "result.json").read_text()), bare(name)
     total = sum(spent[k] for k in ("import", "parent", "workers", "report", "export"))
     parts = "  ".join(f"{k} {spent[k]:.1f}" for k in ("import", "parent", "workers", "report", "export"))
+    bare_s = spent["runs"] * each
+    search = spent["parent"] + spent["workers"] - start_s
     print(
-        f"{name:12s} {total:6.1f} s CPU, {wall:.0f} s wall, {runs} evaluations:  {parts}"
-        f"  FMU {runs * each:.1f} ({1e3 * each:.2f} ms a run)  total/FMU {total / (runs * each):.2f}"
+        f"{name:14s} {total:6.1f} s CPU, {wall:.0f} s wall, {spent['runs']} runs:  {parts}"
+        f"  FMU {bare_s:.1f} ({1e3 * each:.2f} ms a run)  total/FMU {total / bare_s:.2f}"
+        f"  search/FMU {search / bare_s:.2f}",
+        flush=True,
     )
-    if name in ("motor", "screw", "gearbox") and script_points:
+    if name in IDENTIFIED and script_points:
         _beside(name, result, total, script_points, output)
+    if name in TUNED and script_points:
+        _beside_tuning(name, result, total)
+
+
+def python_with_numpy() -> float:
+    """CPU seconds of an empty process that has imported NumPy: no worker can start for less."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run([sys.executable, "-c", "import numpy"], check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def _beside_tuning(name: str, result: dict[str, Any], total: float) -> None:
+    """SciPy's evolution over the lean loop until it has our final cost."""
+    path, cost = str(SCENARIOS / f"{name}.toml"), repr(result["after"]["cost"])
+    done = subprocess.run(
+        [sys.executable, str(HERE / "script_tuning.py"), path, cost],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = json.loads(done.stdout)
+    above = found["cost"] / result["after"]["cost"] - 1.0
+    print(
+        f"{'':14s} the script: {found['cpu']:.1f} s CPU, {found['runs']} runs ({found['says']}); ours {total:.2f} s;"
+        f"  script/ours {found['cpu'] / total:.1f}, cost {above:+.1e} above ours",
+        flush=True,
+    )
 
 
 def _beside(name: str, result: dict[str, Any], total: float, count: int, output: Path) -> None:
@@ -247,9 +318,10 @@ def main() -> None:
     if options.one:
         print("\n" + json.dumps(one(options.one, options.output)))
         return
+    start_s = min(python_with_numpy() for _ in range(3))
     with tempfile.TemporaryDirectory() as folder:
         for name in options.scenarios or COMMANDS:
-            measure(name, options.output or Path(folder), options.script_points)
+            measure(name, options.output or Path(folder), options.script_points, start_s)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -109,9 +109,20 @@ class Parameter:
         return (value - offset) / factor
 
 
+class Combination(Protocol):
+    """Parameters that set variables of the FMU together, such as the values of a law at several temperatures."""
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+
+    def assignments(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return FMU start values for named ``values``, which hold those of the members."""
+
+
 @dataclass(frozen=True)
 class ParameterSpace:
-    """The parameters of one search, in order.
+    """The parameters of one search, in order; those of a combination set variables together.
 
     Raises
     ------
@@ -120,6 +131,7 @@ class ParameterSpace:
     """
 
     parameters: tuple[Parameter, ...]
+    combinations: tuple[Combination, ...] = ()
 
     def __post_init__(self) -> None:
         seen: set[str] = set()
@@ -237,11 +249,15 @@ class ParameterSpace:
 
         Parameters that belong to another recording than ``recording`` are left out.
         """
-        return {
+        together = {name for combination in self.combinations for name in combination.members}
+        found = {
             p.variable: p.to_variable(values[p.name])
             for p in self.parameters
-            if p.recording is None or p.recording == recording
+            if p.name not in together and (p.recording is None or p.recording == recording)
         }
+        for combination in self.combinations:
+            found |= combination.assignments(values)
+        return found
 
     def for_recordings(self, names: Sequence[str], per_recording: Sequence[str]) -> "ParameterSpace":
         """Return a space in which each parameter of ``per_recording`` has one copy per recording.
@@ -255,4 +271,4 @@ class ParameterSpace:
                 continue
             fields = {f: getattr(p, f) for f in p.__dataclass_fields__}
             spread += [Parameter(**{**fields, "name": f"{p.name}[{n}]", "recording": n}) for n in names]
-        return ParameterSpace(tuple(spread))
+        return ParameterSpace(tuple(spread), self.combinations)

@@ -6,7 +6,7 @@ side by side as in the checkout, so that the paths in a scenario hold in both.
 
 import shutil
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -86,6 +86,7 @@ def _example(path: Path) -> Example:
             missing.append(text)
     if (content.get("recordings") or {}).get("fit") == []:
         missing.append("its recordings")
+    needs += _licences(needs)
     for stage in [p for p in needs[1:] if p.suffix == ".toml"]:
         needs += [shipped() / place for place in _example(stage).needs]
     root = shipped().resolve()
@@ -97,6 +98,13 @@ def _example(path: Path) -> Example:
         tuple(places),
         tuple(missing),
     )
+
+
+def _licences(files: Sequence[Path]) -> list[Path]:
+    """What belongs to measured recordings of others: ``servo_LICENSE.txt`` to ``servo_*``, and where they come from."""
+    licences = {p.with_name(f"{p.stem.split('_')[0]}_LICENSE.txt") for p in files}
+    found = sorted(p for p in licences if p.is_file())
+    return [*found, *(p.with_name("SOURCES.md") for p in found[:1])]
 
 
 def _files(folder: Path, text: str) -> list[Path]:

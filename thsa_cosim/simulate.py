@@ -21,6 +21,7 @@ from thsa_cosim.scenario import Scenario
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.study import (
     ChannelError,
+    CouplingError,
     Engine,
     Place,
     Progress,
@@ -29,6 +30,7 @@ from thsa_cosim.study import (
     Want,
     communication_points,
     compare,
+    coupling_error,
     describe,
     study_identity,
 )
@@ -65,6 +67,8 @@ class SimulateResult:
     """reason -> number of recordings"""
     files: tuple[Path, ...]
     notes: tuple[str, ...] = ()
+    coupling: CouplingError | None = None
+    """What the steps of a system's components cost on the first recording; None where nothing is coupled by steps."""
 
     @cached_property
     def data(self) -> Inspection:
@@ -83,7 +87,8 @@ class SimulateResult:
     def trust(self) -> Trust:
         """Whether the model leaves nothing but noise of the fit recordings (of all, without any)."""
         fit = [r for r in self.recordings if r.role == "fit"] or self.recordings
-        return judge([residual for r in fit for residual in _residuals(self.scenario, r)])
+        known = [self.coupling.reason] if self.coupling is not None and self.coupling.reason else []
+        return judge([residual for r in fit for residual in _residuals(self.scenario, r)], known)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of result.json: plain JSON types."""
@@ -99,6 +104,7 @@ class SimulateResult:
             "data": self.data.to_dict(),
             "trust": self.trust.to_dict(),
             "notes": list(self.notes),
+            **({} if self.coupling is None else {"coupling": self.coupling.to_dict()}),
             "recordings": [
                 {
                     "name": r.name,
@@ -152,7 +158,8 @@ def simulate(scenario: Scenario, place: Place) -> SimulateResult:
             request = Request(Want.SIGNALS, np.zeros((1, 0)))
             (outcomes,) = Engine(runner, on_progress=count).ask(recordings, request).outcomes
             notes = (*scenario.notes, *runner.notes)
-        result = _written(place.folder, scenario, recordings.cases, outcomes, notes)
+        coupled = _coupling(scenario, recordings.cases, outcomes)
+        result = _written(place.folder, scenario, recordings.cases, outcomes, notes, coupled)
         study.complete()
     return result
 
@@ -188,6 +195,7 @@ def _written(
     cases: Sequence[tuple[Recording, str, Experiment]],
     outcomes: Sequence[Outcome],
     notes: tuple[str, ...],
+    coupled: CouplingError | str,
 ) -> SimulateResult:
     """Compare, and write what was found; StudyError if every simulation failed."""
     results = tuple(
@@ -199,11 +207,39 @@ def _written(
         reason, number = failures.most_common(1)[0]
         raise StudyError(f"All {len(results)} simulations failed, {number} of them because {reason}.")
     files = [_write_csv(folder, r) for r in results if r.simulated is not None]
-    result = SimulateResult(scenario, results, failures, (folder / RESULT, *files), notes)
+    said = coupled if isinstance(coupled, str) else coupled.sentence()
+    result = SimulateResult(
+        scenario,
+        results,
+        failures,
+        (folder / RESULT, *files),
+        (*notes, said) if said else notes,
+        None if isinstance(coupled, str) else coupled,
+    )
     partial = folder / f"{RESULT}.part"
     partial.write_text(json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     partial.replace(folder / RESULT)
     return result
+
+
+def _coupling(
+    scenario: Scenario,
+    cases: Sequence[tuple[Recording, str, Experiment]],
+    outcomes: Sequence[Outcome],
+) -> CouplingError | str:
+    """What coupling by steps costs on the first recording that could be simulated."""
+    for (recording, _, experiment), outcome in zip(cases, outcomes, strict=True):
+        if outcome.signals is not None:
+            measured = outcome.signals.select([n for n in scenario.measured if n in outcome.signals])
+            return coupling_error(
+                scenario.fmu,
+                scenario.simulation,
+                experiment,
+                {},
+                measured,
+                {n: recording.noise.get(n, 0.0) for n in measured.names},
+            )
+    return ""
 
 
 def _cases(scenario: Scenario) -> list[tuple[Recording, str, Experiment]]:
@@ -221,7 +257,7 @@ def _cases(scenario: Scenario) -> list[tuple[Recording, str, Experiment]]:
                 inputs=scenario.drive(recording),
                 outputs=scenario.outputs,
                 time=communication_points(scenario, recording),
-                fixed={**fixed, **start},
+                fixed={**fixed, **start, **recording.start},
                 tolerance=scenario.simulation.tolerance,
             )
             cases.append((recording, role, experiment))

@@ -85,7 +85,9 @@ def test_actuator_right_hand_side_equals_the_equations_of_the_article():
             )
         )
         v_cmd, load, t = rng.normal() * 9e-3, rng.normal() * 5e4, rng.uniform(-55, 25)
-        got = evaluated.at(list(state.values()), [v_cmd, load, t])
+        got = evaluated.at(
+            list(state.values()), [v_cmd, load, *[t] * (model.u.numel() - 2)]
+        )  # one temperature
         k, i = 10e-3 / (2 * np.pi), 30
         w, x, v = state["motor.w_m"], state["stabilizer.x"], state["stabilizer.v"]
         force = 3e8 * (k * state["motor.phi"] / i - x) + 5e5 * (k * w / i - v)
@@ -114,7 +116,9 @@ def test_actuator_starts_in_equilibrium_under_the_load():
     model = causal(THSA / "Actuator.mo")
     evaluated = Evaluated(model)
     start = np.array(
-        evaluated.start(0, np.zeros(8), [0, 55e3, -30], evaluated.p, np.zeros(model.m.numel()))
+        evaluated.start(
+            0, np.zeros(8), [0, 55e3, *[-30] * (model.u.numel() - 2)], evaluated.p, np.zeros(model.m.numel())
+        )
     ).ravel()
     assert start[model.states.index("stabilizer.x")] == pytest.approx(-55e3 / 3e8, rel=1e-12)
     assert np.count_nonzero(start) == 1

@@ -1,6 +1,7 @@
 """The parts of an identification, each on its own: channels, laws, parameter sets."""
 
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,35 @@ def test_laws_are_fitted_as_wanted_or_selected() -> None:
     assert chosen["R"].selected
     assert chosen["R"].law.form == "linear"
     assert chosen["R"].deviation is None
+
+
+def test_laws_are_compared_with_the_material_of_their_unit_or_the_one_that_is_named() -> None:
+    """R = 1 + 0.1 t in ohm is negative and much steeper than copper; as a published law, too."""
+    laws, _ = fit_laws(POINTS, {"R": LawTable(form="linear", published=[1.0, 0.1])})
+    assert {doubt.kind for doubt in laws["R"].doubts} == {"sign"}
+    assert {doubt.kind for doubt in laws["R"].published_doubts} == {"sign"}
+    laws, _ = fit_laws(POINTS, {"R": LawTable(form="linear", quantity="none")})
+    assert laws["R"].doubts == ()
+    laws, _ = fit_laws(POINTS, {"R": LawTable(form="linear", quantity="magnet-flux")})
+    assert {doubt.kind for doubt in laws["R"].doubts} == {"sign", "direction"}
+    unsure = [replace(p, parameters={"R": replace(p.parameters["R"], identifiable=False)}) for p in POINTS]
+    assert fit_laws(unsure, {"R": LawTable(form="linear")})[0]["R"].doubts == ()
+
+
+def test_a_vogel_law_is_in_the_parameter_set_as_the_best_form_that_a_block_can_hold() -> None:
+    true = published_law("vogel", [1e-3, 700.0, -120.0])
+    points = [point(t, R=float(true(t))) for t in (-55.0, -40.0, -30.0, -20.0, -10.0, 0.0, 25.0)]
+    laws, _ = fit_laws(points, {"R": LawTable(quantity="viscous-friction")})
+    assert laws["R"].law.form == "vogel"
+    space = ParameterSpace((Parameter("R", "m.R.a0", "Ohm", 0.0, 9e3, variable_unit="Ohm"),))
+    found, (note,) = parameter_set("set", space, points, laws, description(*BLOCK))
+    assert set(found.values) == set(BLOCK)
+    assert "because a TemperatureLaw block holds no vogel law" in note
+    held = found.values
+    at_30 = held["m.R.alpha1"] * np.exp(-30.0 * held["m.R.beta1"]) + held["m.R.alpha2"] * np.exp(
+        -30.0 * held["m.R.beta2"]
+    )
+    assert at_30 == pytest.approx(float(true(-30.0)), rel=0.1)
 
 
 def test_too_few_points_for_a_law_is_a_note() -> None:

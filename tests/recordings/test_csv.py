@@ -261,3 +261,44 @@ def test_a_damaged_table_is_a_recording_or_an_input_error(tmp_path_factory, data
         sentence = ""
         assert np.isfinite(recording.signals["v"]).all()
     assert "\n" not in sentence
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        [
+            "3/17/2026 11:59:59.50 AM",
+            "3/17/2026 12:00:00.00 PM",
+            "3/17/2026 12:00:00.50 PM",
+            "3/17/2026 1:00:00.00 PM",
+        ],
+        ["11:59:59.50 am", "12:00:00.00 pm", "12:00:00.50 pm", "1:00:00.00 pm"],
+        [
+            "17.03.2026 11:59:59,50",
+            "17.03.2026 12:00:00,00",
+            "17.03.2026 12:00:00,50",
+            "17.03.2026 13:00:00,00",
+        ],
+        [
+            "3/17/2026 11:59:59.50 PM",
+            "3/18/2026 12:00:00.00 AM",
+            "3/18/2026 12:00:00.50 AM",
+            "3/18/2026 1:00:00.00 AM",
+        ],
+    ],
+)
+def test_dates_with_half_days(tmp_path, stamps):
+    file = tmp_path / "us.csv"
+    rows = "".join(f"{stamp};{k}\n" for k, stamp in enumerate(stamps))
+    file.write_text(f"Date/Time;force [N]\n{rows}")
+    found = read_recording(file, {"F": Column("force")}, time=TimeAxis("Date/Time"), units={"F": "N"})
+    assert found.signals.time == pytest.approx([0.0, 0.5, 1.0, 3600.5])
+
+
+def test_a_point_where_the_comma_is_decimal_is_no_guess(tmp_path):
+    file = tmp_path / "mixed.csv"
+    rows = [f"{k},0;{900 + k},5" for k in range(20)]
+    rows[12] = "12,0;1.234"
+    file.write_text("\n".join(["t [s];F [N]", *rows]))
+    with pytest.raises(RecordingError, match=r"'F' is not numeric: '1\.234' on line 14"):
+        read_recording(file, {"F": Column("F")}, time=TimeAxis("t"), units={"F": "N"})

@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import report_studies as studies
 
@@ -12,6 +13,7 @@ import thsa_cosim as tc
 from thsa_cosim import cli
 from thsa_cosim.errors import InputError
 from thsa_cosim.report.compare import compare, list_studies
+from thsa_cosim.report.compare.watch import drift_of, jump_of, limits
 
 
 @pytest.fixture(scope="module")
@@ -63,8 +65,9 @@ def test_a_difference_has_the_error_of_independent_estimates(folder: Path) -> No
     assert difference.value == pytest.approx(0.095)
     assert difference.stderr == pytest.approx(0.019 * 2**0.5)
     assert difference.z == pytest.approx(0.095 / (0.019 * 2**0.5))
-    assert row.beyond_chance
-    assert found.sentence() == "R_s differs beyond chance (|z| > 2)."
+    assert row.beyond(3.5)
+    assert not row.beyond(3.6)
+    assert found.sentence() == "R_s rose by 5 ± 1 %; no other value differs beyond chance (|z| > 2.39)."
     assert dict(found.settings) == {"seed": ("7", "9")}
 
 
@@ -117,9 +120,9 @@ def test_the_commands_print_tables_json_and_a_page(
     both = ["compare", str(folder / "first"), str(folder / "second")]
     page = tmp_path / "page.html"
     assert cli.run_command([*both, "-o", str(page)]) == 0
-    assert "R_s differs beyond chance" in capsys.readouterr().out
+    assert "R_s rose by 5 ± 1 %" in capsys.readouterr().out
     text = page.read_text()
-    assert "R_s differs beyond chance" in text
+    assert "R_s rose by 5 ± 1 %" in text
     assert cli.run_command([*both, "--json"]) == 0
     content = json.loads(capsys.readouterr().out)
     row = next(q for q in content["quantities"] if (q["name"], q["at"]) == ("R_s", "25 °C"))
@@ -134,3 +137,76 @@ def test_a_notebook_gets_tables(folder: Path) -> None:
     table = tc.compare(folder / "first", folder / "second")
     assert table.loc[("parameter", "R_s", "25 °C"), ("second", "z")] == pytest.approx(3.5355, rel=1e-3)
     assert table.attrs["settings"] == {"seed": ("7", "9")}
+
+
+def test_the_amplitude_of_a_ripple_is_compared_and_not_its_parts(folder: Path, tmp_path: Path) -> None:
+    """The sine and cosine part of 3 and 4, ± 0.1 each, have 5 ± 0.1 together; a fifth of it has fallen by 80 %."""
+    for name, factor in (("first", 1.0), ("second", 0.2)):
+        shutil.copytree(folder / name, tmp_path / name)
+
+        def change(content: dict[str, Any], factor: float = factor) -> None:
+            for part, value in (("a_s", 3.0), ("a_c", 4.0)):
+                number = {"value": factor * value, "unit": "N.m", "stderr": 0.1, "identifiable": True}
+                content["points"][0]["parameters"][f"cogging:motor.{part}"] = number
+
+        edit(tmp_path / name / "result.json", change)
+    found = compare([tmp_path / "first", tmp_path / "second"])
+    row = next(r for r in found.rows if r.name == "cogging:motor.amplitude")
+    first, second = row.values
+    assert first is not None
+    assert second is not None
+    assert (row.group, first.value, second.value) == ("effect", pytest.approx(5.0), pytest.approx(1.0))
+    assert first.stderr == pytest.approx(0.1)
+    assert "cogging:motor.amplitude fell by 80 ± 2 %" in found.sentence()
+    assert "a_s" not in found.sentence()
+
+
+def values_of_unit(folder: Path, first: Path, values: list[float]) -> list[str]:
+    """Studies of one unit, whose R_s at every temperature is given."""
+    made = []
+    for week, value in enumerate(values):
+        shutil.copytree(first, folder / f"week{week:02d}")
+
+        def change(content: dict[str, Any], value: float = value) -> None:
+            for point in content["points"]:
+                point["parameters"]["R_s"]["value"] = value
+
+        edit(folder / f"week{week:02d}" / "result.json", change)
+        made.append(str(folder / f"week{week:02d}"))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("last", "alarm"), [(1.01, "No alarm."), (2.0, "Alarm: R_s at −30 °C is 2 ohm, where 1 ±")]
+)
+def test_a_unit_is_watched_over_time(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], last: float, alarm: str
+) -> None:
+    weeks = values_of_unit(tmp_path, folder / "first", [0.98, 1.02, 1.01, 0.99, 1.0, 1.02, 0.98, 1.0, last])
+    assert cli.run_command(["compare", *weeks, "--watch", "-o", str(tmp_path / "page.html")]) == 0
+    assert alarm in capsys.readouterr().out.replace("\n", " ")
+    assert alarm in (tmp_path / "page.html").read_text()
+    assert cli.run_command(["compare", *weeks, "--watch", "--json"]) == 0
+    trends = json.loads(capsys.readouterr().out)["trends"]
+    raised = {t["name"] for t in trends if t["alarm"]}
+    assert raised == (set() if alarm == "No alarm." else {"R_s"})
+
+
+def test_three_studies_are_no_trend(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    weeks = values_of_unit(tmp_path, folder / "first", [1.0, 1.1, 1.2])
+    assert cli.run_command(["compare", *weeks, "--watch"]) == 2
+    assert "A trend needs 4 studies or more" in capsys.readouterr().err
+
+
+def test_an_alarm_is_false_once_a_unit_and_year() -> None:
+    """The chance that the limits leave to each quantity and week, added up over a year, against random numbers."""
+    rng, weeks, raised = np.random.default_rng(1), (5, 12, 52), 0
+    units = 3000
+    for week in weeks:
+        jump, drift = limits(week, 1)
+        for values in rng.standard_normal((units, week)):
+            j, d = jump_of(values)[0], drift_of(values)[0]
+            assert j is not None
+            assert d is not None
+            raised += abs(j) > jump or abs(d) > drift
+    assert raised * 52 / (units * len(weeks)) == pytest.approx(1.0, abs=0.3)

@@ -148,7 +148,8 @@ def thsa_cosim(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 def scenario(folder: Path, head: str = "", target: str = "w_m") -> Path:
     time = np.arange(0.0, 0.3, 1e-3)
-    rows = [f"{t:.4f},{0.03 * t:.6g},0" for t in time]
+    noise = np.random.default_rng(1).normal(0.0, 1e-6, time.size)
+    rows = [f"{t:.4f},{0.03 * t:.6g},{n:.3g}" for t, n in zip(time, noise, strict=True)]
     (folder / "ramp.csv").write_text("\n".join(["t,c,v", *rows]) + "\n")
     path = folder / "system.toml"
     path.write_text(SCENARIO.format(head=head, fmus=FMUS.as_posix(), target=target))
@@ -171,6 +172,24 @@ def test_a_scenario_runs_its_system_and_writes_it_for_others(tmp_path: Path, mer
     done = thsa_cosim("simulate", other, "-o", tmp_path / "again", "--no-report", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["recordings"][0]["error"]["v"]["rmse"] == pytest.approx(own, rel=1e-9)
+
+
+def test_a_study_says_what_its_communication_steps_cost(tmp_path: Path) -> None:
+    """The error of second order falls to a quarter; a step that is too long is a reason not to trust the result."""
+    changes, verdicts = [], []
+    for step in (2e-3, 1e-3, 5e-4):
+        path = scenario(tmp_path)
+        steps = f'execution = "coupled"\nstep = {step}\n'
+        path.write_text(path.read_text().replace('.fmu"\n', '.fmu"\n' + steps))
+        study = tmp_path / f"study_{step}"
+        done = thsa_cosim("simulate", path, "-o", study, "--no-report")
+        assert done.returncode == 0, done.stderr
+        assert "halving the communication steps changes v" in done.stdout
+        result = json.loads((study / "result.json").read_text())
+        changes.append(result["coupling"]["halved"]["v"]["rms"])
+        verdicts.append(any("lower the steps" in reason for reason in result["trust"]["reasons"]))
+    assert 3.0 < changes[1] / changes[2] < 6.0
+    assert verdicts == [True, False, False]  # at 2 ms the coupled loop is close to its stability limit
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """What a system of FMUs can be trusted with, beyond what holds for one FMU: its parts, its loops, its steps."""
 
 import tempfile
-import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,7 @@ from thsa_cosim.check.numerics import STEP_OK, STEP_WARNING, Judged
 from thsa_cosim.fmu.native import platform_folders
 from thsa_cosim.signals import Signals
 from thsa_cosim.system.description import SystemDescription, loops
-from thsa_cosim.system.write import write_ssp
+from thsa_cosim.system.write import write_halved
 
 
 def system_lines(description: SystemDescription) -> Iterator[tuple[str, Judged]]:
@@ -38,17 +37,8 @@ def coupling_line(
     stepped = [c for c in description.system.components if c.execution == "coupled"]
     if not stepped:
         return Verdict.NOT_TRIED, "no component is coupled by communication steps", {}
-    system = replace(
-        description.system,
-        components=tuple(
-            replace(c, step=0.5 * c.step) if c.execution == "coupled" and c.step is not None else c
-            for c in description.system.components
-        ),
-    )
     with tempfile.TemporaryDirectory(prefix="thsa-cosim-halved-") as folder:
-        with zipfile.ZipFile(description.path) as archive:
-            fmus = {c.source: archive.read(c.source) for c in system.components}
-        halved = write_ssp(system, fmus, Path(folder) / "halved.ssp", description.default_experiment)
+        halved = write_halved(description, Path(folder) / "halved.ssp")
         with LocalRunner([replace(experiment, fmu=halved)], deadline_s=2.0 * deadline_s) as runner:
             outcome = runner.run([Job(experiment.name)])[0]
     if not outcome.ok or outcome.signals is None:

@@ -32,20 +32,32 @@ def list_command(folder: Path | None, as_json: bool) -> None:
 @click.argument("folders", metavar="A B ...", type=PATH, nargs=-1, required=True)
 @click.option("-o", "--output", type=PATH, default=None, help="Also write the comparison as an HTML page.")
 @click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")
-def compare(folders: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
+@click.option(
+    "--watch",
+    "watched",
+    is_flag=True,
+    help="The studies are of one unit, in the order of time: trends, and an alarm that is false once a year.",
+)
+def compare(folders: tuple[Path, ...], output: Path | None, as_json: bool, watched: bool) -> None:
     """Compare study folders with the first one: parameters, effects, errors and settings that differ.
 
-    Each difference is given with its standard error and with z, the difference divided by that error.
+    Each difference is given with its standard error and with z, the difference divided by that error. With --watch,
+    each quantity of the latest study is compared with what the earlier ones predict, and its trend is tested.
     """
     from thsa_cosim.report.compare import compare as compared
     from thsa_cosim.report.compare.page import write_comparison
-    from thsa_cosim.report.compare.tables import print_comparison
+    from thsa_cosim.report.compare.tables import print_comparison, print_trends
+    from thsa_cosim.report.compare.watch import watch
 
     found = compared(folders)
+    trends = watch(found) if watched else ()
     if output is not None:
-        write_comparison(found, output)
+        write_comparison(found, output, trends)
         click.echo(f"page: {output}", err=True)
     if as_json:
-        click.echo(json.dumps(found.to_dict(), indent=2))
+        own = {"trends": [{**asdict(t), "alarm": t.alarm} for t in trends]} if watched else {}
+        click.echo(json.dumps(found.to_dict() | own, indent=2))
+    elif watched:
+        print_trends(console(), trends)
     else:
         print_comparison(console(), found)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.inspection import Inspection
@@ -37,6 +37,10 @@ class Value:
     unit: str
     stderr: float
     reason: str = ""
+    variable: str = ""
+    """The FMU variable that it belongs to, where a result says so."""
+    role: str = "coefficient"
+    """``"coefficient"`` or ``"shape"``, of an effect's parameter."""
 
     @property
     def identifiable(self) -> bool:
@@ -213,3 +217,5 @@ class DiagnosisResult:
     notes: tuple[str, ...]
     data: Inspection = field(default_factory=Inspection)
     """What is to be known about the recordings."""
+    asked: Mapping[str, Any] = field(default_factory=dict)
+    """The scenario as it was asked for, in its tables: what the extended model is identified with again."""

@@ -226,6 +226,7 @@ class _Closing:
             failures=counts,
             notes=tuple(notes),
             data=self.scenario.data,
+            asked=scenario.table.model_dump(mode="json", by_alias=True, exclude_unset=True),
         )
 
     def _declared(self) -> Identified:

@@ -103,14 +103,21 @@ def make_causal(flat: FlatModel) -> CausalModel:
     Raises ModelicaError, naming the equation and the variable, for a singular system, a constraint that needs the
     derivative of an input, and an over-determined initialization.
     """
+    if flat.reinits and any(v.state_select in ("prefer", "always") for v in flat.variables.values()):
+        # what else jumps at a reinit depends on the choice of states: those that the model prefers are made candidates
+        try:
+            return with_domains(_Builder(flat, preferred=True).build())
+        except ModelicaError:
+            pass
     return with_domains(_Builder(flat).build())
 
 
 class _Builder:
     """Holds what the steps of one translation share."""
 
-    def __init__(self, flat: FlatModel) -> None:
+    def __init__(self, flat: FlatModel, preferred: bool = False) -> None:
         self.flat = flat
+        self.preferred = preferred  # preferred states without a derivative in the equations get one
         self.values: dict[str, float] = {}
         self.time = ca.SX.sym("time")
         self.parameters: list[FlatVariable] = []
@@ -246,6 +253,10 @@ class _Builder:
         shown = {v.name: self._at(v.place, Term("ref", (v.name,))) for v in self.discretes}
         self._finish_updates()
         self._give_a_state()
+        if self.preferred:
+            for variable in self.unknowns:
+                if variable.state_select in ("prefer", "always"):
+                    system.derivative(variable.name)
         states = system.prepare(self.flat.name)
         solution = system.solve(self.flat.name)
         initial = self._initial(states, initial_equations)
@@ -378,13 +389,13 @@ class _Builder:
         if not initial.blocks and not {str(s) for s in ca.symvar(initial.x)} & modes:
             return ca.SX(0, 1)
         unknown = [b.unknown.nz[i] for b in self.system.blocks for i in range(b.unknown.numel())]
-        guesses = [initial.guesses[n] for b in self.system.blocks for n in b.names]
+        guesses = [initial.guesses.get(n, ca.SX(0)) for b in self.system.blocks for n in b.names]
         moved = ca.substitute([indicators], [x, column(unknown)], [initial.x_start, column(guesses)])[0]
         return moved
 
     def _z_start(self, name: str) -> ca.SX:
         if name in self.split.starts:
-            return self._at(self.flat.variables[name].place, self.split.starts[name])
+            return self._at(self.flat.variables[name].place, Term("noEvent", (self.split.starts[name],)))
         variable = self.flat.variables.get(name)
         if variable is None:
             return self.memory.updates[name]

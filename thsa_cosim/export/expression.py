@@ -182,7 +182,7 @@ class Translator:
     # -- relations
 
     def _timeless(self, expression: ca.SX) -> bool:
-        held = self.memory.symbols()
+        held = self.memory.symbols() | {str(mode) for mode in self.modes}
         return all(str(s) in self.discrete or str(s) in held for s in ca.symvar(expression))
 
     def _ordered(self, op: str, a: ca.SX, b: ca.SX, events: bool) -> ca.SX:

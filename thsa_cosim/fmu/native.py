@@ -86,7 +86,7 @@ class Library:
 
 
 def _loaded_with_neighbours(path: Path) -> ctypes.CDLL:
-    """Load a library; if one that it needs is not found, load those beside it in the archive first."""
+    """Load a library; if one that it needs is not found, load those next to it in the archive first."""
     try:
         return ctypes.CDLL(str(path))
     except OSError:

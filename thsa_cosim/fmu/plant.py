@@ -256,7 +256,7 @@ class Plant(Closing):
         exact = plan.mode in ("derivative", "intermediate")
         free = self.stepping == "free" and exact and is_offered(instance)
         if free:
-            tolerance = solver_tolerance(instance, tolerance)
+            tolerance = solver_tolerance(instance, plan, tolerance)
         instance.initialize_begin(start, stop, tolerance)
         instance.set_values(plan.input_channels, plan.first)
         instance.initialize_end()

@@ -22,6 +22,9 @@ SAFETY, LOOSEST = 0.5, 5e-6
 """The FMU's solver is given this share of the tolerance, and no larger one. On a grid of samples steps are shorter than
 any tolerance asks for; free ones are as long as it allows. The rig's sensors see 5e-6 of full speed as 0.007 standard
 deviations; what every shipped scenario errs by is printed by ``benchmarks/stepping.py``."""
+DENSE = 0.5
+"""Share of samples at which an input bends or jumps from which on steps are as short as on the grid: the tolerance is
+then the one that is asked for."""
 
 
 class Trajectory(ctypes.Structure):
@@ -74,10 +77,20 @@ def is_offered(instance: Instance) -> bool:
     return instance.kind == "co-simulation" and instance.library.exports(FUNCTION)
 
 
-def solver_tolerance(instance: Instance, tolerance: float | None) -> float:
+def solver_tolerance(instance: Instance, plan: Plan, tolerance: float | None) -> float:
     """The tolerance that the FMU is given for ``tolerance`` (None: that of its default experiment)."""
     wanted = tolerance or instance.description.default_experiment.tolerance or 1e-6
-    return min(LOOSEST, SAFETY * wanted)
+    tight = min(LOOSEST, SAFETY * wanted)
+    bends = len(_course(plan, tight).segments) > DENSE * len(plan.grid.times)
+    return wanted if bends else tight
+
+
+def _course(plan: Plan, tolerance: float) -> Course:
+    merged = min(MERGED, tolerance)
+    if merged not in plan.courses:
+        plan.courses[merged] = Course(plan, merged)
+    course: Course = plan.courses[merged]
+    return course
 
 
 def follow(instance: Instance, plan: Plan, progress: FloatArray, tolerance: float) -> Signals:
@@ -86,10 +99,7 @@ def follow(instance: Instance, plan: Plan, progress: FloatArray, tolerance: floa
     ``tolerance``: what ``solver_tolerance`` gave. Inputs keep within it, and within ``segments.MERGED``, of their
     samples.
     """
-    merged = min(MERGED, tolerance)
-    course = plan.courses.get(merged)
-    if course is None:
-        course = plan.courses[merged] = Course(plan, merged)
+    course = _course(plan, tolerance)
     struct, n = course.struct, len(plan.grid.times)
     results = np.empty((len(plan.outputs), n))
     struct.results, struct.progress = results.ctypes.data, progress[1:].ctypes.data

@@ -8,6 +8,7 @@ from thsa_cosim.errors import InputError
 from thsa_cosim.identify.results import LawResult, PointResult
 from thsa_cosim.laws import (
     FORMS,
+    SearchedLaw,
     candidates_for,
     doubts_about,
     fit_law,
@@ -16,7 +17,55 @@ from thsa_cosim.laws import (
     quantity_of,
     select_law,
 )
+from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.scenario import LawTable
+
+
+def all_laws(
+    points: Sequence[PointResult], specs: Mapping[str, LawTable], space: ParameterSpace
+) -> tuple[dict[str, LawResult], list[str]]:
+    """The laws that were searched as such, and those that go through the points; as :func:`fit_laws`."""
+    searched = [c for c in space.combinations if isinstance(c, SearchedLaw)]
+    laws = {
+        law.parameter.name: _searched(law, point, specs[law.parameter.name])
+        for point in points[:1]
+        for law in searched
+    }
+    others = {name: spec for name, spec in specs.items() if name not in {s.parameter.name for s in searched}}
+    fitted, notes = fit_laws(points, others)
+    return {**laws, **fitted}, notes
+
+
+def _searched(law: SearchedLaw, point: PointResult, spec: LawTable) -> LawResult:
+    """A law of the unknowns at ``point``, with their covariance."""
+    name, unit = law.parameter.name, law.parameter.unit
+    estimates = [point.parameters[member] for member in law.members]
+    order = [list(point.parameters).index(member) for member in law.members]
+    sizes = np.array([np.nan if e.stderr is None else e.stderr for e in estimates])
+    covariance = point.correlation[np.ix_(order, order)] * np.outer(sizes, sizes)
+    known = bool(np.isfinite(covariance).all())
+    found = law.law([e.value for e in estimates], covariance if known else None)
+    temperatures = np.linspace(law.cold, law.warm, 33)
+    published = law_deviation = None
+    if spec.published is not None and spec.compared_form is not None:
+        published = published_law(spec.compared_form, spec.published)
+        law_deviation = largest_deviation(found, published, temperatures)
+    quantity = quantity_of(unit, spec.quantity)
+    about = (quantity, name, unit, law.cold, law.warm)
+    return LawResult(
+        parameter=name,
+        unit=unit,
+        law=found,
+        candidates=(found,),
+        selected=False,
+        published=published,
+        deviation=None,
+        law_deviation=law_deviation,
+        determined=known,
+        between=(law.cold, law.warm),
+        doubts=doubts_about(found, *about) if known else (),
+        published_doubts=doubts_about(published, *about) if published is not None else (),
+    )
 
 
 def fit_laws(

@@ -54,7 +54,8 @@ def parameter_set(
     """Everything identified as start values in the FMU's units, and one sentence per parameter left out."""
     values: dict[str, float] = {}
     notes: list[str] = []
-    for parameter in space.parameters:
+    together = {name for combination in space.combinations for name in combination.members}
+    for parameter in (p for p in space.parameters if p.name not in together):
         found = [p.parameters[parameter.name] for p in points if parameter.name in p.parameters]
         law = laws.get(parameter.name)
         held = None if law is None else _held(law)
@@ -74,5 +75,7 @@ def parameter_set(
                 f"{parameter.name} is not in the parameter set: it has several values and no law that"
                 f" {fmu.path.name} can hold."
             )
+    for combination in space.combinations if len(points) == 1 else ():
+        values |= combination.assignments({n: points[0].parameters[n].value for n in combination.members})
     units = {v: fmu.variables[v].unit or "" for v in values if v in fmu.variables}
     return ParameterSet(name, values, units, "identified by thsa-cosim"), notes

@@ -9,7 +9,7 @@ from thsa_cosim.laws import Doubt, Law
 from thsa_cosim.search import Generation, LocalSearch
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.ssv import ParameterSet
-from thsa_cosim.study import ChannelError, Comparison
+from thsa_cosim.study import ChannelError, Comparison, CouplingError
 
 
 @dataclass(frozen=True)
@@ -113,6 +113,8 @@ class LawResult:
     """What the law does between the points' temperatures that its material does not."""
     published_doubts: tuple[Doubt, ...] = ()
     """The same of the published law."""
+    between: tuple[float, float] | None = None
+    """degC: the ends of the recorded temperatures, of a law that was searched as such."""
 
 
 @dataclass(frozen=True)
@@ -142,3 +144,5 @@ class IdentifyResult:
     """What is to be known about the recordings."""
     trust: Trust = field(default_factory=lambda: Trust("explained"))
     """Whether the fit leaves nothing but noise."""
+    coupling: CouplingError | None = None
+    """What the steps of a system's components cost at the estimate; None where nothing is coupled by steps."""

@@ -11,7 +11,7 @@ from thsa_cosim import __version__
 from thsa_cosim.batch import Journal
 from thsa_cosim.errors import InputError, StudyError
 from thsa_cosim.identify.force import force_balance
-from thsa_cosim.identify.over_temperature import fit_laws, values_at
+from thsa_cosim.identify.over_temperature import all_laws, values_at
 from thsa_cosim.identify.parameter_set import parameter_set
 from thsa_cosim.identify.point import PointSearch, search_point
 from thsa_cosim.identify.problem import (
@@ -31,6 +31,7 @@ from thsa_cosim.search import EvolutionSettings, Generation
 from thsa_cosim.study import (
     Case,
     Comparison,
+    CouplingError,
     Engine,
     Place,
     Reply,
@@ -40,6 +41,7 @@ from thsa_cosim.study import (
     build_case,
     case_residuals,
     compare_case,
+    coupling_error,
     describe,
     interleave,
     study_identity,
@@ -89,6 +91,7 @@ def identify(
                 search.try_parameters(engine)
                 search.search(engine)
                 search.validate(engine)
+            search.couple()
             study.complete()
         except KeyboardInterrupt:
             search.interrupted = True
@@ -115,6 +118,7 @@ class _Search:
         self._comparisons: list[Comparison] = []
         self._notes: list[str] = []
         self._engine: Engine | None = None
+        self._coupling: CouplingError | None = None
 
     def note(self, notes: Sequence[str]) -> None:
         """Take sentences for the result."""
@@ -181,6 +185,8 @@ class _Search:
 
     def validate(self, engine: Engine) -> None:
         """Score the held-out recordings with what was found."""
+        if not self._held_out:
+            return
         results, laws = self._results(), self._laws()[0]
         space = self._scenario.parameters
         shared = [p.name for p in space.parameters]
@@ -204,6 +210,26 @@ class _Search:
                 self._notes.append(f"{recording.name} was not scored: {outcome.reason}")
                 continue
             self._comparisons.append(compare_case(case, recording, "validate", outcome.signals))
+
+    def couple(self) -> None:
+        """Find out what coupling by steps costs at the first point's estimate, on its first recording."""
+        point, found = self._points[0], self._found.get(0)
+        if found is None or found.result is None or not found.signals:
+            return
+        case, spec = point.cases[0], self._scenario
+        values = {name: estimate.value for name, estimate in found.result.parameters.items()}
+        coupled = coupling_error(
+            spec.fmu,
+            spec.simulation,
+            case.experiment(f"fit/{case.name}", None),
+            point.space.assignments(values, case.name),
+            found.signals[0],
+            {channel.name: channel.noise for channel in case.channels},
+        )
+        if isinstance(coupled, CouplingError):
+            self._coupling = coupled
+        if said := (coupled if isinstance(coupled, str) else coupled.sentence()):
+            self.note([said])
 
     def result(self) -> IdentifyResult:
         """Everything found so far."""
@@ -239,7 +265,8 @@ class _Search:
             settings={**scenario.search.model_dump(), "error": scenario.cost.error},
             force=force,
             data=Inspection.of((*scenario.data.findings, *slips), scenario.data.repairs),
-            trust=judge(self._residuals(), (*map(_reason, slips), *self._bounds())),
+            trust=judge(self._residuals(), (*map(_reason, slips), *self._bounds(), *self._coupled())),
+            coupling=self._coupling,
         )
 
     def _residuals(self) -> list[Residual]:
@@ -263,6 +290,9 @@ class _Search:
             for f in misfits(self._point_residuals(k), self._scenario.file_units)
         ]
         return [f for f in found if (f.recording, f.channel, f.kind) not in known]
+
+    def _coupled(self) -> list[str]:
+        return [] if self._coupling is None or not self._coupling.reason else [self._coupling.reason]
 
     def _bounds(self) -> list[str]:
         """Parameters that ended on a bound: the fit would have gone on."""
@@ -303,7 +333,7 @@ class _Search:
         return 0 if self._engine is None else self._engine.evaluations[self._points[k].label]
 
     def _laws(self) -> tuple[dict[str, LawResult], list[str]]:
-        return fit_laws(self._results(), self._scenario.laws)
+        return all_laws(self._results(), self._scenario.laws, self._scenario.parameters)
 
     def _fit_comparisons(self) -> list[Comparison]:
         comparisons = []

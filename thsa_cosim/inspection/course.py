@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.stats import spearmanr
 
 from thsa_cosim.errors import UnitError
 from thsa_cosim.inspection.channel import Channel
@@ -65,8 +64,11 @@ def _trend(channel: Channel, levels: FloatArray) -> Iterator[Finding]:
     """Noise that grows (or falls) from the first window to the last of (m,) ``levels``, whatever the signal does."""
     course = running_median(np.log(levels), 5)
     change = float(course[-1] - course[0])
-    order = spearmanr(np.arange(levels.size), levels).statistic
-    if abs(change) < np.log(_GROWING) or abs(order) < _MONOTONE:
+    if abs(change) < np.log(_GROWING):
+        return
+    from scipy.stats import spearmanr  # slow to import, and such noise is rare
+
+    if abs(spearmanr(np.arange(levels.size), levels).statistic) < _MONOTONE:
         return
     text = (
         f"the noise of {channel.name} {'grows' if change > 0.0 else 'falls'} over the recording, from"

@@ -13,6 +13,7 @@ from thsa_cosim.laws.law import (
 )
 from thsa_cosim.laws.plausibility import Doubt, doubts_about
 from thsa_cosim.laws.quantity import QUANTITIES, Quantity, candidates_for, quantity_of
+from thsa_cosim.laws.searched import SEARCHABLE, SearchedLaw
 
 __all__ = [
     "CANDIDATES",
@@ -21,9 +22,11 @@ __all__ = [
     "PHYSICAL",
     "POLYNOMIALS",
     "QUANTITIES",
+    "SEARCHABLE",
     "Doubt",
     "Law",
     "Quantity",
+    "SearchedLaw",
     "candidates_for",
     "doubts_about",
     "fit_law",

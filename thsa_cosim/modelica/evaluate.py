@@ -81,6 +81,8 @@ class Evaluator:
         """A value as constants."""
         if isinstance(value, list):
             return [self.fixed(v, expression, what) for v in value]
+        if isinstance(value, Record):
+            return Record(value.type, {k: self.fixed(v, expression, what) for k, v in value.fields.items()})
         if not isinstance(value, Term):
             return value
         done: dict[int, Scalar] = {}
@@ -181,6 +183,12 @@ class Evaluator:
         value = self.fixed(condition, Syntax("boolean", (False,)), "a condition")
         self.scope.world.structural = structural
         return bool(value)
+
+    def parameters_only(self, values: Sequence[Value]) -> bool:
+        """Whether values depend on nothing but parameters."""
+        variables = self.scope.world.variables
+        used = {name for value in values for scalar in elements(value) for name in names(scalar)}
+        return all(n in variables and variables[n].variability in ("parameter", "constant") for n in used)
 
     def tuned(self, conditions: Sequence[Scalar]) -> bool:
         """Whether conditions depend on nothing but parameters that are no Reals."""

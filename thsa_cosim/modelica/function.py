@@ -17,6 +17,7 @@ from thsa_cosim.modelica.syntax import ClassDefinition, Component, Equation, Syn
 from thsa_cosim.modelica.terms import Enumeration, Term, make
 
 MOST_TURNS = 100_000
+MOST_UNKNOWN = 200  # turns of a loop whose end is not known at export
 
 
 class _Unset:
@@ -29,12 +30,26 @@ class _Unset:
 UNSET = _Unset()
 
 
+class _Unknown(ModelicaError):
+    """The steps of a function depend on values that are not known at export."""
+
+
 def apply(evaluator: Evaluator, target: Scope, expression: Syntax) -> Value:
     """Value of a call of a function, a record constructor or an enumeration's conversion."""
     _, arguments, named = expression.args
     positional = [evaluator.value(a) for a in arguments]
     keyed = {name: evaluator.value(a) for name, a in named.items()}
-    return invoke(evaluator, target, positional, keyed, expression)
+    try:
+        return invoke(evaluator, target, positional, keyed, expression)
+    except _Unknown:
+        given = [*positional, *keyed.values()]
+        if not evaluator.parameters_only(given):
+            raise
+        # its parameters are then fixed at export
+        what = f"an argument of {target.qualified}()"
+        positional = [evaluator.fixed(v, expression, what) for v in positional]
+        keyed = {name: evaluator.fixed(v, expression, what) for name, v in keyed.items()}
+        return invoke(evaluator, target, positional, keyed, expression)
 
 
 def invoke(
@@ -422,17 +437,30 @@ class Statements:
             env[name] = hidden
         return env, ""
 
-    def _while(self, statement: Equation, env: dict[str, Value]) -> tuple[dict[str, Value], str]:
+    def _while(
+        self, statement: Equation, env: dict[str, Value], unknown: int = 0
+    ) -> tuple[dict[str, Value], str]:
+        """Turns run at export; after one whose condition is unknown, the loop goes on as a branch of its own."""
         condition, body = statement.args
         for _ in range(MOST_TURNS):
             chosen = self._at(env).value(condition)
-            if isinstance(chosen, Term):
-                raise self._error(
-                    statement, "a while loop on a condition unknown at export is a limit of this exporter."
-                )
-            if not chosen:
+            if not isinstance(chosen, Term) and not chosen:
                 return env, ""
-            env, left = self.run(body, env)
+            if unknown + isinstance(chosen, Term) > MOST_UNKNOWN:
+                place = self.evaluator.scope.place(statement.line)
+                raise _Unknown(
+                    f"{place}: a while loop on a condition unknown at export is a limit of this exporter."
+                )
+            after, left = self.run(body, env)
+            if isinstance(chosen, Term):
+                if left == "return":
+                    raise self._error(
+                        statement, "a return out of such a while loop is a limit of this exporter."
+                    )
+                if left != "break":
+                    after, _ = self._while(statement, after, unknown + 1)
+                return self._merged(chosen, after, env, statement), ""
+            env = after
             if left == "break":
                 return env, ""
             if left:

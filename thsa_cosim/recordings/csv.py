@@ -33,6 +33,7 @@ _NUMBER = {
     mark: re.compile(rf"[+-]?(\d+({re.escape(mark)}\d*)?|{re.escape(mark)}\d+)([eE][+-]?\d+)?")
     for mark in ".,"
 }
+_HALF_DAY = re.compile(r"\s*([aApP])\.?[mM]\.?$")
 _STAMP = re.compile(r"(\d{4}-\d\d-\d\d|\d{1,2}[./]\d{1,2}[./]\d{2,4})([ T]+\d{1,2}:\d\d.*)?|\d+:\d\d:\d\d.*")
 _DAY = re.compile(r"(\d{1,2})[./](\d{1,2})[./](\d{4}|\d\d)(?:[ T]+(.*))?")
 
@@ -245,9 +246,11 @@ def _columns(
                 f"{path}: line {number} has more cells than the header names; repair the file."
             )
     lines = [line for _, line in rows]
+    # Where the comma is decimal, a point may be another decimal mark or part thousands: cell by cell says where it is.
+    ambiguous = layout.decimal == "," and any("." in line for line in lines)
     if layout.decimal == "," and layout.delimiter != ",":
         lines = [line.replace(",", ".") for line in lines]
-    if layout.decimal == "." or layout.delimiter != ",":
+    if not ambiguous and (layout.decimal == "." or layout.delimiter != ","):
         try:
             table = np.loadtxt(
                 lines,
@@ -298,9 +301,14 @@ def _stamps(cells: Sequence[str]) -> RawColumn:
 
 
 def _clock(cells: Sequence[str]) -> FloatArray:
-    """Seconds of the day of texts such as 09:41:22,000; without seconds, they are 0."""
-    parts = [[float(part.replace(",", ".")) for part in cell.split(":")] for cell in cells]
+    """Seconds of the day of texts such as 09:41:22,000 or 9:41:22 PM; without seconds, they are 0."""
+    halves = [_HALF_DAY.search(cell) for cell in cells]
+    plain = [cell[: half.start()] if half else cell for cell, half in zip(cells, halves, strict=True)]
+    parts = [[float(part.replace(",", ".")) for part in cell.split(":")] for cell in plain]
     clock = np.array([[*row, 0.0, 0.0][:3] for row in parts])
+    for row, half in zip(clock, halves, strict=True):
+        if half:  # 12 AM is midnight, 12 PM is noon
+            row[0] = row[0] % 12.0 + (12.0 if half[1] in "pP" else 0.0)
     return np.asarray(clock @ np.array([3600.0, 60.0, 1.0]), dtype=np.float64)
 
 

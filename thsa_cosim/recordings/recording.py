@@ -32,6 +32,7 @@ SUFFIXES: Mapping[str, str] = {
     **dict.fromkeys((".parquet", ".pq"), "parquet"),
     **dict.fromkeys((".mf4", ".mdf"), "mf4"),
     ".mat": "mat",
+    ".json": "json",
     ".tdms": "tdms",
 }
 """Reader module per file name ending."""
@@ -118,6 +119,21 @@ class Recording:
     """Samples of ``signals`` (n,) that repairs leave out, for the signals that have any."""
     repairs: tuple[str, ...] = ()
     """What the scenario's repairs did: sentences."""
+    start: Mapping[str, float] = field(default_factory=dict)
+    """Start values that this recording gives the FMU's parameters, in the FMU's units: its gain, its first position."""
+
+    def with_start(self, names: Sequence[str]) -> "Recording":
+        """Return the recording with the signals ``names`` turned into start values: each one's first sample."""
+        if not names:
+            return self
+        return replace(
+            self,
+            signals=self.signals.select(n for n in self.signals.names if n not in names),
+            noise={n: v for n, v in self.noise.items() if n not in names},
+            samples={n: s for n, s in self.samples.items() if n not in names},
+            left_out={n: m for n, m in self.left_out.items() if n not in names},
+            start={n: float(self.signals[n][0]) for n in names},
+        )
 
     @property
     def duration(self) -> float:

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from thsa_cosim.signals import FloatArray
 
@@ -15,6 +14,8 @@ class LinearSpline:
     """
 
     def __init__(self, t: FloatArray, y: FloatArray, knots: FloatArray) -> None:
+        from scipy.linalg import cho_solve_banded, cholesky_banded  # slow to import; few inputs are splines
+
         self.t, self.y, self.knots = t, y, knots
         segments = knots.size - 1
         self.segment: NDArray[np.intp] = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, segments - 1)

@@ -66,7 +66,7 @@ def roles(table: CommonTable, fmu: FmuDescription) -> tuple[tuple[str, ...], tup
                     f"{key}.smooth: {column.smooth!r} is for inputs; outputs are compared as measured."
                 )
             measured.append(name)
-        else:
+        elif not (variable.causality in _SETTABLE and variable.is_float):
             raise ScenarioError(f"{key} is a {variable.causality} of {fmu.path.name}; set it in [fixed].")
     for wanted in fmu.inputs:
         if wanted.name not in columns and wanted.is_float and not wanted.may_stay_open:
@@ -79,6 +79,30 @@ def roles(table: CommonTable, fmu: FmuDescription) -> tuple[tuple[str, ...], tup
         find_variable(fmu, source, "temperature.input", fmu.inputs)
         raise ScenarioError(f"temperature.input {source!r} has no column; add [recordings.columns.{source}].")
     return tuple(inputs), tuple(measured)
+
+
+def started(table: CommonTable, fmu: FmuDescription) -> tuple[str, ...]:
+    """Return the FMU's parameters among ``recordings.columns``: each recording gives them its own start value.
+
+    Raises
+    ------
+    ScenarioError
+        If the parameter is searched for or fixed as well, or the column is treated as a signal.
+    """
+    found = []
+    searched = {p.variable: p.name for p in table.parameters} if isinstance(table, IdentifyTable) else {}
+    for name, column in table.recordings.columns.items():
+        if fmu.variables[name].causality not in _SETTABLE:
+            continue
+        key = f"recordings.columns.{_quoted(name)}"
+        if column.value is not None:
+            raise ScenarioError(f"{key}: a parameter's constant belongs in [fixed]; name a column.")
+        if name in searched:
+            raise ScenarioError(f"{key} is searched for as parameter {searched[name]!r}; remove one of them.")
+        if name in table.fixed:
+            raise ScenarioError(f"{key} is in [fixed], too; remove one of them.")
+        found.append(name)
+    return tuple(found)
 
 
 def outputs(table: CommonTable, fmu: FmuDescription, measured: tuple[str, ...]) -> tuple[str, ...]:

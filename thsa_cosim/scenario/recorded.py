@@ -13,6 +13,7 @@ from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Column, Recording, TimeAxis, read_recording
 from thsa_cosim.scenario import check
 from thsa_cosim.scenario.files import expand, named
+from thsa_cosim.scenario.law_search import with_laws
 from thsa_cosim.scenario.model import Scenario, TemperaturePoint
 from thsa_cosim.scenario.recording_schema import TemperatureTable
 from thsa_cosim.scenario.schema import (
@@ -93,6 +94,7 @@ def _resolve(
 ) -> Scenario:
     description = open_model(path, table, fmu)
     inputs, measured = check.roles(table, description)
+    started = check.started(table, description)
     parameters = check.parameters(table, description) if isinstance(table, IdentifyTable) else ()
     space = ParameterSpace(tuple(p for p, _ in parameters))
     fixed = check.fixed(path, table, description, space)
@@ -108,7 +110,8 @@ def _resolve(
         )
     if not files["fit"] and not (isinstance(table, SimulateTable) and files["validate"]):
         raise ScenarioError("recordings.fit names no recording; add one, or give it with --fit.")
-    read = _recordings(table, files, description, parts_held_out=not validate)
+    read = _recordings(table, files, description, started, parts_held_out=not validate)
+    space = with_laws(table, space, read["fit"])
     per_recording = [p.name for p, where in parameters if where == "recording"]
     scenario = Scenario(
         kind=table.kind,
@@ -149,6 +152,7 @@ def _recordings(
     table: CommonTable,
     files: Mapping[str, Sequence[Path]],
     description: FmuDescription,
+    started: Sequence[str],
     *,
     parts_held_out: bool,
 ) -> dict[str, tuple[Recording, ...]]:
@@ -164,11 +168,13 @@ def _recordings(
     found: dict[str, list[Recording]] = {"fit": [], "validate": []}
 
     def read(role: str, path: Path, axis: TimeAxis, name: str) -> None:
-        found[role].append(
-            read_recording(
-                path, columns, time=axis, units=units, temperature=temperature, name=name, driven=driven
-            )
-        )
+        recording = read_recording(
+            path, columns, time=axis, units=units, temperature=temperature, name=name, driven=driven
+        ).with_start(started)
+        for variable, value in recording.start.items():
+            where = f"{path}: recordings.columns.{variable}"
+            check.check_range(description.variables[variable], value, where, description)
+        found[role].append(recording)
 
     for role, paths in files.items():
         for path, name in named(paths):
@@ -193,7 +199,7 @@ def _points(
     """Group recordings by rounded temperature, coldest first, or all of them together."""
 
     def rounded(recording: Recording) -> float | None:
-        if temperature is None or temperature.group == "joint" or recording.temperature_degC is None:
+        if temperature is None or temperature.group != "point" or recording.temperature_degC is None:
             return None
         return round(recording.temperature_degC / temperature.round_to) * temperature.round_to + 0.0
 

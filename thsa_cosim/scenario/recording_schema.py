@@ -54,7 +54,8 @@ class ColumnTable(Table):
     """``[recordings.columns.<variable>]``: where a signal comes from.
 
     One table per FMU input and per measured output; every input of the FMU needs one. Whether a signal is driven or
-    compared follows from the FMU.
+    compared follows from the FMU. A parameter of the FMU takes the column's first value in each recording as its start
+    value: a gain that differs from run to run, the position in which a recording begins.
     """
 
     column: Name | None = None
@@ -204,8 +205,9 @@ class TemperatureTable(Table):
     """Unit of that column."""
     round_to: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
     """K; recordings whose rounded temperatures agree are fitted together."""
-    group: Literal["point", "joint"] = "point"
-    """``"joint"``: one fit over all recordings, for example of law coefficients."""
+    group: Literal["point", "joint", "law"] = "point"
+    """``"joint"``: one fit over all recordings. ``"law"``: the same, and every parameter with a ``law`` of a stated
+    form is identified as that law: for recordings whose temperature moves."""
 
     @model_validator(mode="after")
     def _one_source(self) -> "TemperatureTable":

@@ -278,9 +278,9 @@ class IdentifyTable(CommonTable):
 class BalanceTable(Table):
     """``[[diagnose.balances]]``: an equation between measured signals, whose residual says where an effect sits.
 
-    Formulas of measured signals, inputs, numbers and ``[[parameters]]`` (as on the drawing), with + - * / **, ``der``,
-    ``sgn``, ``abs``, ``max`` and ``min``. The terms' coefficients are fitted, so that wrong declared parameters do not
-    show.
+    Formulas of measured signals, inputs, numbers and ``[[parameters]]`` (as on the drawing), with ``+ - * / **``,
+    ``der``, ``sgn``, ``abs``, ``max`` and ``min``. The terms' coefficients are fitted, so that wrong declared
+    parameters do not show.
     """
 
     name: Name

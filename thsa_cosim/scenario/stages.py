@@ -69,6 +69,10 @@ def _stage(path: Path, k: int, table: StagesTable, seed: int | None) -> Stage:
         scenario = load_scenario(file, seed=table.seed if seed is None else seed)
     except InputError as error:
         raise type(error)(one_line(f"{path}: {key}: {error}")) from None
+    if scenario.parameters.combinations:
+        raise ScenarioError(
+            one_line(f"{path}: {key}: {file.name} searches laws (temperature.group = 'law'), no stage.")
+        )
     known = scenario.parameters.names
     for name in spec.give or ():
         if name not in known:

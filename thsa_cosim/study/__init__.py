@@ -5,6 +5,7 @@
 ``engine``      vectors × cases → journal → outcomes: every kind asks it
 ``interleave``  several searches at once over one engine
 ``comparison``  simulated against measured
+``coupling``    what the communication steps of a system cost
 ``place``       folder, executor, progress and command as one object
 ``identity``    what was asked, key by key, built from all that a scenario says
 ``folder``      the study folder: its marker, and the refusal to mix two studies
@@ -22,6 +23,7 @@ from thsa_cosim.study.comparison import (
     compare_case,
     summarise,
 )
+from thsa_cosim.study.coupling import CouplingError, coupling_error
 from thsa_cosim.study.digest import digest_of_folder, digest_of_recording, digest_of_text
 from thsa_cosim.study.engine import Engine, Problem, Reply, Request, Want, stacked
 from thsa_cosim.study.exported import export_digest, is_made_from, note_made_from
@@ -36,6 +38,7 @@ __all__ = [
     "Case",
     "ChannelError",
     "Comparison",
+    "CouplingError",
     "Engine",
     "OnProgress",
     "Place",
@@ -51,6 +54,7 @@ __all__ = [
     "communication_points",
     "compare",
     "compare_case",
+    "coupling_error",
     "describe",
     "digest_of_folder",
     "digest_of_recording",

@@ -84,7 +84,7 @@ def build_case(scenario: Scenario, recording: Recording, fixed: Mapping[str, flo
         fmu=scenario.fmu.path,
         inputs=scenario.drive(recording),
         time=grid,
-        fixed=fixed,
+        fixed={**fixed, **recording.start},
         channels=channels,
         measured=recording.compared.select(scenario.measured),
         temperature_degC=recording.temperature_degC,

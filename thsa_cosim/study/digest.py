@@ -39,4 +39,6 @@ def digest_of_recording(recording: Recording) -> str:
         digest.update(name.encode())
         digest.update(signals[name].tobytes())
     digest.update(str(recording.lead_in).encode())
+    for name, value in recording.start.items():
+        digest.update(f"{name}={value!r}".encode())
     return digest.hexdigest()

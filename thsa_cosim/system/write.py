@@ -3,10 +3,12 @@
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from thsa_cosim.fmu.description import DefaultExperiment, Variable
 from thsa_cosim.ssv import SSV
+from thsa_cosim.system.description import SystemDescription
 from thsa_cosim.system.ssp import ANNOTATION, ROOT, SSC, SSD
 from thsa_cosim.system.structure import Component, System
 
@@ -30,6 +32,20 @@ def write_ssp(system: System, fmus: Mapping[str, bytes], path: Path, experiment:
             archive.writestr(entry, entries[name])
     partial.replace(path)
     return path
+
+
+def write_halved(description: SystemDescription, path: Path) -> Path:
+    """Write the same system with half the communication steps of its coupled components."""
+    system = replace(
+        description.system,
+        components=tuple(
+            replace(c, step=0.5 * c.step) if c.execution == "coupled" and c.step is not None else c
+            for c in description.system.components
+        ),
+    )
+    with zipfile.ZipFile(description.path) as archive:
+        fmus = {c.source: archive.read(c.source) for c in system.components}
+    return write_ssp(system, fmus, path, description.default_experiment)
 
 
 def _structure(system: System, experiment: DefaultExperiment) -> bytes:

@@ -155,6 +155,22 @@ def test_a_declared_parameter_at_the_end_of_its_range_is_named():
     assert out_of_range(fit([0.0, 9.0], np.eye(2))) == "", "an effect's own coefficient may end there"
 
 
+@pytest.mark.parametrize(
+    ("start", "spread", "lower", "value", "name"),
+    [
+        (0.01, 0.02, 0.0, 0.0, ""),  # friction of unknown size: there may be none
+        (0.03, 0.02, 0.0, 0.0, "p"),  # the drawing says that there is some
+        (0.01, 0.02, 0.0, 1.0, "p"),  # the other end
+        (0.01, 0.02, 0.005, 0.005, "p"),  # an end that is not nothing
+        (0.01, np.inf, 0.0, 0.0, "p"),  # no drawing
+    ],
+)
+def test_a_friction_of_unknown_size_may_vanish_behind_an_effect(start, spread, lower, value, name):
+    own = fit([value, 1.0], np.eye(2))
+    p = replace(own.unknowns.members[0], start=start, spread=spread, lower=lower, upper=1.0)
+    assert out_of_range(replace(own, unknowns=Unknowns((p, *own.unknowns.members[1:])))) == name
+
+
 def test_those_are_tried_that_come_near_the_best():
     def scored(*gains: float) -> Any:
         return [SimpleNamespace(held_out_gain=g) for g in gains]

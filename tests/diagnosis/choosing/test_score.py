@@ -11,7 +11,6 @@ from diagnosis.analytic import DECLARED, bench, candidates, unknowns
 from thsa_cosim.diagnosis.choosing import score as room
 from thsa_cosim.diagnosis.choosing.score import (
     ENOUGH,
-    LOST,
     Scored,
     fixed_shapes,
     go_on,
@@ -92,29 +91,6 @@ def test_a_fit_that_leaves_more_is_tried_from_the_drawing_too_and_the_better_one
         given[2], [1.0, 4.0]
     )  # the declared one from the drawing, the effect's as found
     assert more == {}
-
-
-def test_a_fit_that_is_lost_is_tried_by_way_of_smoothed_residuals(fits: Any, monkeypatch: pytest.MonkeyPatch):
-    """Judged without weights: under those of the declared model a poor fit may look like noise."""
-    choice = scored(fit(2.0, 3.0, 300.0))
-    bench: Any = SimpleNamespace(factors=lambda part: np.full(SAMPLES, 0.5))
-    asked: list[Any] = []
-
-    def from_coarse(bench: Any, unknowns: Any, vector: np.ndarray) -> Fit:
-        asked.append(vector)
-        return fit(5.0, 0.2, 10.0)
-
-    monkeypatch.setattr(room, "refine_from_coarse", from_coarse)
-    fits.queue = [fit(2.1, 0.99 * LOST * 0.25, 150.0)]
-    assert polish(bench, choice, choice.fit, HELD, apart=True).fit.vector[0] == 2.1
-    fits.queue = [fit(2.1, 1.01 * LOST * 0.25, 150.0)]
-    assert polish(bench, choice, choice.fit, HELD).fit.vector[0] == 2.1
-    assert asked == [], "only the first effect that is chosen is worth it"
-    fits.queue = [fit(2.1, 1.01 * LOST * 0.25, 150.0)]
-    assert polish(bench, choice, choice.fit, HELD, apart=True).fit.vector[0] == 5.0
-    np.testing.assert_array_equal(asked, [[2.1, 4.0]])
-    fits.queue = [fit(2.1, 1.01 * LOST * 0.25, 5.0)]
-    assert polish(bench, choice, choice.fit, HELD, apart=True).fit.vector[0] == 2.1, "the least cost counts"
 
 
 def test_a_polish_that_fails_leaves_what_there_was(fits: Any, monkeypatch: pytest.MonkeyPatch):

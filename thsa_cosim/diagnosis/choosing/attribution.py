@@ -97,7 +97,8 @@ def attribute(
         offered: Sequence[Candidate] = candidates
         while offered:
             selection = Selection(bench, weights, current, current_held, say)
-            left = [c for c in offered if not any(_is_taken(c, s.candidate) for s in accepted)]
+            free = [c for c in offered if not any(_is_taken(c, s.candidate) for s in accepted)]
+            left = [c for c in free if not _is_known(c, current)]
             rounds.append(
                 _round(selection, left, scan(current), seed + len(rounds), accepted, offered is candidates)
             )
@@ -131,6 +132,11 @@ def attribute(
         weights.plain(current_held, "validate"),
         tuple(notes),
     )
+
+
+def _is_known(candidate: Candidate, fit: Fit) -> bool:
+    """Whether a coefficient of the candidate is in the model already, by another variant of its effect."""
+    return any(p.variable in fit.unknowns.names for p in candidate.coefficients)
 
 
 def further_parts(accepted: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:

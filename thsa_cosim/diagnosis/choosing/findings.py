@@ -155,7 +155,9 @@ def _parameters(members: list[Scored], values: Mapping[str, Value]) -> dict[str,
     """By name; with the slot and block where an effect acts in several ways."""
     ways = {s.candidate.component + s.candidate.slot.name for s in members}
     return {
-        p.name if len(ways) == 1 else p.variable: values[p.variable]
+        p.name if len(ways) == 1 else p.variable: replace(
+            values[p.variable], variable=p.variable, role=p.role
+        )
         for s in members
         for p in s.candidate.parameters
         if p.variable in values

@@ -105,8 +105,13 @@ def insignificant(choice: Scored) -> str:
 
 
 def out_of_range(fit: Fit) -> str:
-    """Name of a declared parameter that a fit drives to the end of its range, or ""."""
+    """Name of a declared parameter that a fit drives to the end of its range, or "".
+
+    A quantity that cannot be negative, and whose size the drawing does not know, may be nothing: an effect that takes
+    the place of the constant friction which stood for it leaves none of that.
+    """
     for u, x in zip(fit.unknowns.members, fit.vector, strict=True):
-        if u.declared and (x <= u.lower or x >= u.upper):
+        may_be_nothing = x <= u.lower == 0.0 and abs(u.start) <= u.spread < np.inf
+        if u.declared and (x <= u.lower or x >= u.upper) and not may_be_nothing:
             return u.name
     return ""

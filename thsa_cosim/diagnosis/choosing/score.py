@@ -8,7 +8,6 @@ import numpy as np
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.bench import Bench
-from thsa_cosim.diagnosis.fitting.continuation import refine_from_coarse
 from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
 from thsa_cosim.diagnosis.fitting.structure import block_squares, consistency, relative_consistency, structure
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
@@ -16,8 +15,6 @@ from thsa_cosim.signals import FloatArray
 
 #: Mean squared residual, in variances of the noise, above which a fit may have missed the optimum.
 ENOUGH = 1.05
-#: The same, above which anybody sees that it has: 1.1 times the noise.
-LOST = 1.21
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,29 +119,20 @@ def _scored(bench: Bench, proposal: Proposal, fit: Fit, current: Fit, held: Floa
     )
 
 
-def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray, *, apart: bool = False) -> Scored:
+def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scored:
     """The same with every Jacobian column fresh, and once more with the declared parameters from the drawing.
 
     A missing effect bends the declared parameters; from there an effect that acts by contact may not find its optimum.
-    ``apart``: where a fit is `LOST` even so, from there by way of smoothed residuals, too.
     """
     unknowns = choice.fit.unknowns
     drawing = np.where([u.declared for u in unknowns.members], unknowns.start, choice.fit.vector)
     fits = [refine(bench, unknowns, choice.fit.vector, steps=choice.fit.steps)]
-    if _above(ENOUGH, fits):
+    if fits[0] is None or fits[0].misfit > ENOUGH * fits[0].residual.size:
         fits.append(refine(bench, unknowns, drawing))
-    if apart and _above(LOST, fits, bench.factors("fit")):
-        start = min((f for f in fits if f is not None), key=lambda f: f.cost, default=choice.fit)
-        fits.append(refine_from_coarse(bench, unknowns, start.vector))
     best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)
     if best is None:
         return choice
     return _scored(bench, choice.proposal, best, current, held) or choice
-
-
-def _above(limit: float, fits: Sequence[Fit | None], factors: FloatArray | float = 1.0) -> bool:
-    """Whether no fit so far leaves less than ``limit`` variances of the noise, without ``factors`` (N,)."""
-    return not any(f is not None and np.mean((f.residual / factors) ** 2) <= limit for f in fits)
 
 
 def extended_unknowns(declared: Unknowns, accepted: Sequence[Scored]) -> Unknowns:

@@ -6,7 +6,7 @@ residuals that the candidate's best combination promises (the score test, Rao 19
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +15,12 @@ from scipy.linalg import cho_factor, cho_solve
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import RESPONSE, Fit
-from thsa_cosim.diagnosis.fitting.unknowns import Unknown
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 from thsa_cosim.signals import FloatArray
 
 _WANTED = 3.0 * RESPONSE
+_AT_ONCE = 2**29
+"""Bytes of residuals that are held before they become responses of half the size."""
 #: Left of a response after orthogonalisation (as a share of its square) below which nothing can be said.
 TESTABLE = 1e-6
 
@@ -119,7 +121,7 @@ def propose(bench: Bench, base: Fit, rows: Sequence[tuple[Candidate, Mapping[str
             vector[index[variable]] += step
         again = []
         for (r, variable, step, at), residual in zip(
-            columns, bench.residuals(unknowns, vectors, "fit"), strict=True
+            columns, _in_batches(bench, unknowns, vectors, base.residual.size), strict=True
         ):
             if residual is None:
                 again.append((r, variable, 0.1 * step, at))
@@ -134,10 +136,19 @@ def propose(bench: Bench, base: Fit, rows: Sequence[tuple[Candidate, Mapping[str
             break
     proposals, orthogonal = [], Orthogonal(base)
     for r, (candidate, shapes) in enumerate(rows):
-        responses = [found.get((r, p.variable)) for p in candidate.coefficients]
+        responses = [found.pop((r, p.variable), None) for p in candidate.coefficients]
         if all(response is not None for response in responses):
             proposals.append(_propose(base, orthogonal, candidate, shapes, np.stack(responses, axis=1)))  # type: ignore[arg-type]
     return sorted(proposals, key=lambda p: -p.gain)
+
+
+def _in_batches(
+    bench: Bench, unknowns: Unknowns, vectors: FloatArray, size: int
+) -> Iterator[FloatArray | None]:
+    """The residuals of each vector; of long recordings only as many at a time as memory should hold."""
+    count = max(1, _AT_ONCE // (8 * size))
+    for first in range(0, len(vectors), count):
+        yield from bench.residuals(unknowns, vectors[first : first + count], "fit")
 
 
 class Orthogonal:

@@ -73,6 +73,24 @@ def other_places(winner: Proposal, proposals: Sequence[Proposal]) -> list[Propos
     return list(found.values())
 
 
+def simplest_first(scored: Sequence[Scored], ties: Callable[[Scored, Scored], bool]) -> list[Scored]:
+    """``scored``, best first, but before the best the simplest form of its effect there that explains as much.
+
+    ``ties``: whether the first explains as much as the second, within the uncertainty.
+    """
+    ordered = list(scored)
+    for other in sorted(scored[1:], key=lambda s: len(s.candidate.coefficients)):
+        best, own = ordered[0].candidate, other.candidate
+        same = (own.effect.name, own.slot.name, own.component) == (
+            best.effect.name,
+            best.slot.name,
+            best.component,
+        )
+        if same and len(own.coefficients) < len(best.coefficients) and ties(other, ordered[0]):
+            return [other, *(s for s in ordered if s is not other)]
+    return ordered
+
+
 def other_waves(proposals: Sequence[Proposal], scored: Sequence[Scored]) -> list[Proposal]:
     """The ripples among ``proposals`` (best first) at wave numbers that were not refined.
 
@@ -117,7 +135,7 @@ class Selection:
                     solved = max(solved, result.fit_gain, proposal.gain)
         most = max((s.fit_gain for s in scored), default=0.0)
         scored = [self._go_on(s) if s.fit_gain > RIVAL_WORTH * most else s for s in scored]
-        return sorted(scored, key=lambda s: -s.held_out_gain)
+        return simplest_first(sorted(scored, key=lambda s: -s.held_out_gain), self._ties)
 
     def is_open(self, scored: Sequence[Scored]) -> bool:
         """Whether something is left to explain, and no fit so far leaves nothing."""
@@ -142,7 +160,8 @@ class Selection:
             before[p.candidate.key] = max(before.get(p.candidate.key, 0.0), p.gain)
         better = worth_refining([p for p in further if p.gain > BETTER * before[p.candidate.key]], limit)
         chosen = sorted([*better, *other_waves(proposals, scored)], key=lambda p: -p.gain)
-        return sorted([*scored, *self._fitted(chosen)], key=lambda s: -s.held_out_gain)
+        found = sorted([*scored, *self._fitted(chosen)], key=lambda s: -s.held_out_gain)
+        return simplest_first(found, self._ties)
 
     def evidence(self, one: Scored) -> Evidence:
         """What speaks for a candidate."""
@@ -176,7 +195,7 @@ class Selection:
                 evidence = self.evidence(one)
             why = objection_beside(evidence, limit) if beside else objection(evidence, limit, first)
             if not why:
-                one = one if whole else self._whole(one, apart=first and not objections)
+                one = one if whole else self._whole(one)
                 why = insignificant(one)
                 if not why and (name := out_of_range(one.fit)):
                     why = f"{one.candidate.name}: it drives the declared parameter {name} to the end of its range"
@@ -212,9 +231,9 @@ class Selection:
                 rivals[name] = polished
         return tuple(rivals.values())
 
-    def _whole(self, one: Scored, apart: bool = False) -> Scored:
+    def _whole(self, one: Scored) -> Scored:
         self.say(f"fitting {one.candidate.name} with all parameters")
-        return polish(self.bench, one, self.current, self.held, apart=apart)
+        return polish(self.bench, one, self.current, self.held)
 
     def _go_on(self, one: Scored) -> Scored:
         return go_on(self.bench, one, self.current, self.held)

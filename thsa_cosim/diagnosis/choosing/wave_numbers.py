@@ -17,8 +17,10 @@ from thsa_cosim.signals import FloatArray, Signals
 
 _BLOCK = 512
 _PEAKS = 3
+#: Share of the steps between samples that a wave number has to be resolved by.
+_USUAL = 0.9
 #: Periods per revolution that are looked at on a shaft; along a path: periods per largest excursion.
-_HARMONICS = np.arange(1.0, 61.0)
+_HARMONICS = np.arange(1.0, 145.0)
 _PERIODS = np.arange(4.0, 200.0, 0.25)
 
 
@@ -73,7 +75,8 @@ def wave_numbers(
             block = z[begin : begin + _BLOCK]
             travel = float(np.ptp(block))
             resolved = grid * travel > 4.0 * np.pi
-            step = float(np.max(np.abs(np.diff(block))))
+            # A few late samples among many do not make a wave ambiguous: stamps that scatter have no aliases.
+            step = float(np.quantile(np.abs(np.diff(block)), _USUAL))
             resolved &= grid * step < np.pi
             if not resolved.any():
                 continue

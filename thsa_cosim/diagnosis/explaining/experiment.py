@@ -31,7 +31,7 @@ def separating_experiment(
 ) -> SeparatingExperiment | None:
     """The profile of ``spec.command`` and ``spec.load`` at which an effect and its rival differ most.
 
-    ``trials`` run the model that holds all effects. The first pair that the recordings cannot tell apart counts, else
+    ``trials`` run the model that holds all effects. The first pair that the recordings cannot distinguish counts, else
     the first effect and its runner-up. ``distance`` is the sum over the outputs' samples of the squared difference of
     both models, as fitted to the present recordings, in variances of the noise; ``present`` the same on the fit
     recordings, for as long a time. The other inputs are held at what they were in the first fit recording. None

@@ -1,11 +1,9 @@
 """Vectors of unknowns → residuals of the recordings, by batches over an engine."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from thsa_cosim.batch import Job, Outcome, Runner
 from thsa_cosim.diagnosis.fitting.trials import Part, Trial
@@ -76,7 +74,6 @@ class Bench:
         self._fixed = dict(fixed or {})
         self.weights: Mapping[str, float] = {}
         """Factors of the channels' residuals, 1 where none is given."""
-        self._width = 0.0
 
     @property
     def evaluations(self) -> int:
@@ -93,18 +90,6 @@ class Bench:
             ]
         )
 
-    @contextmanager
-    def smoothed(self, width: float) -> Iterator[None]:
-        """Within it every signal's residuals are smoothed in time by a Gaussian of ``width`` seconds.
-
-        White noise of a standard deviation of 1 keeps it.
-        """
-        self._width = width
-        try:
-            yield
-        finally:
-            self._width = 0.0
-
     def of(self, part: Part) -> tuple[Trial, ...]:
         """The recordings that play ``part``."""
         return tuple(t for t in self.trials if t.part == part)
@@ -114,26 +99,11 @@ class Bench:
 
         Simulated minus measured, in standard deviations of the noise, times the channel's factor.
         """
-        trials = self.of(part)
-        factors = self.factors(part) if self.weights else 1.0
-        reply = self._ask(Want.RESIDUALS, trials, unknowns, vectors)
-        return [
-            None if residual is None else self._smooth(trials, residual) * factors
-            for residual in reply.residuals
-        ]
-
-    def _smooth(self, trials: Sequence[Trial], residual: FloatArray) -> FloatArray:
-        if self._width == 0.0:
-            return residual
-        smooth = np.empty_like(residual)
-        begin = 0
-        for trial in trials:
-            for channel in trial.case.channels:
-                part = slice(begin, begin := begin + channel.measured.size)
-                width = self._width / float(np.median(np.diff(channel.time)))  # samples
-                size = np.sqrt(max(1.0, 2.0 * np.sqrt(np.pi) * width))
-                smooth[part] = size * gaussian_filter1d(residual[part], width)
-        return smooth
+        reply = self._ask(Want.RESIDUALS, self.of(part), unknowns, vectors)
+        if not self.weights:
+            return list(reply.residuals)
+        factors = self.factors(part)
+        return [None if residual is None else residual * factors for residual in reply.residuals]
 
     def signals(self, unknowns: Unknowns, vector: FloatArray) -> dict[str, Signals | None]:
         """The simulated outputs of every recording, by experiment name; None where the run failed."""

@@ -12,11 +12,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from scipy.stats import norm
+
 from thsa_cosim.errors import InputError
+from thsa_cosim.report.compare.ripple import amplitude, pairs
 from thsa_cosim.report.folder import Json, Study, read_study
 from thsa_cosim.report.parts.text import degrees, listing
 
 NOTABLE_Z = 2.0
+#: So many changes are told one by one.
+_TOLD = 4
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 Key = tuple[str, str, str]
 
@@ -52,6 +57,8 @@ class Row:
     unit: str
     values: tuple[Estimate | None, ...]
     same_unit: bool = True
+    part_of: str = ""
+    """The amplitude that a sine or cosine part belongs to: by itself it depends on where the angle is counted from."""
 
     @cached_property
     def differences(self) -> tuple[Difference | None, ...]:
@@ -61,10 +68,24 @@ class Row:
             None if first is None or not self.same_unit else _difference(first, v) for v in self.values
         )
 
+    def beyond(self, limit: float) -> bool:
+        """Whether some study differs from the first by more than ``limit`` standard errors."""
+        return any(d is not None and d.z is not None and abs(d.z) > limit for d in self.differences)
+
     @property
-    def beyond_chance(self) -> bool:
-        """Whether some study differs from the first by more than chance."""
-        return any(d is not None and d.z is not None and abs(d.z) > NOTABLE_Z for d in self.differences)
+    def change(self) -> str:
+        """What became of the quantity, for two studies: ``fell by 80 ± 3 %``; "" where that says little."""
+        first, last, difference = self.values[0], self.values[-1], self.differences[-1]
+        if first is None or last is None or difference is None or len(self.values) != 2 or not first.value:
+            return ""
+        share = abs(difference.value / first.value)
+        ratio = last.value / first.value
+        errors = [v.stderr / abs(first.value) for v in (last, first) if v.stderr is not None]
+        if ratio < 0.0 or len(errors) < 2:
+            return ""
+        stderr = math.hypot(errors[0], ratio * errors[1])
+        verb = "fell" if difference.value * first.value < 0.0 else "rose"
+        return f"{verb} by {100 * share:.0f} ± {max(100 * stderr, 1.0):.0f} %"
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +110,12 @@ class Comparison:
             "notes": list(self.notes),
         }
 
+    @cached_property
+    def limit(self) -> float:
+        """Standard errors that a difference has to exceed, so that of all of them together 5 % do by chance."""
+        count = max(sum(self._tested().values()), 1)
+        return max(NOTABLE_Z, float(norm.isf(0.5 * (1.0 - 0.95 ** (1.0 / count)))))
+
     def sentence(self) -> str:
         """What differs, in a sentence."""
         parts = []
@@ -96,14 +123,29 @@ class Comparison:
             if not all(has):
                 where = [label for label, one in zip(self.labels, has, strict=True) if one]
                 parts.append(f"only {listing(where)} found {name}")
-        apart = list(dict.fromkeys(r.name for r in self.rows if r.beyond_chance))
-        told = any(d is not None and d.z is not None for r in self.rows for d in r.differences[1:])
+        moved = [r for r in self.rows if not r.part_of and r.beyond(self.limit)]
+        tested = self._tested()
+        changes = {r.name: f"{r.name} {r.change}" for r in moved if r.change and len(moved) <= _TOLD}
+        apart = [name for name in dict.fromkeys(r.name for r in moved) if name not in changes]
+        parts += changes.values()
         if apart:
             parts.append(f"{listing(apart)} {'differs' if len(apart) == 1 else 'differ'} beyond chance")
-        elif told:
-            parts.append("no value differs beyond chance")
+        if len(tested) > len(apart) + len(changes):
+            other = "no other value" if moved else "no value"
+            parts.append(f"{other} differs beyond chance")
         text = "; ".join(parts) or "no uncertainty is known, so no difference can be tested"
-        return text[0].upper() + text[1:] + (f" (|z| > {NOTABLE_Z:g})." if apart or told else ".")
+        if text.startswith(("only ", "no ")):  # a name stays as it is
+            text = text[0].upper() + text[1:]
+        return text + (f" (|z| > {self.limit:.3g})." if tested else ".")
+
+    def _tested(self) -> dict[str, int]:
+        """The quantities whose difference has an uncertainty, with how many differences each has."""
+        found: dict[str, int] = {}
+        for row in self.rows:
+            count = sum(d is not None and d.z is not None for d in row.differences[1:])
+            if count and not row.part_of:
+                found[row.name] = found.get(row.name, 0) + count
+        return found
 
     def _effects(self) -> dict[str, list[bool]]:
         """Which study found which effect."""
@@ -131,7 +173,7 @@ def compare(folders: Sequence[Path]) -> Comparison:
         if study.whole.result is None:
             raise InputError(f"{study.whole.folder} has no result yet; let its study finish first.")
     try:
-        found = [dict(_quantities(study)) for study in studies]
+        found = [_with_amplitudes(dict(_quantities(study))) for study in studies]
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
             f"A result cannot be read ({error}); repeat the study's command to write it anew."
@@ -141,7 +183,8 @@ def compare(folders: Sequence[Path]) -> Comparison:
         raise InputError(
             f"{folders[0]} and the others share no parameter, effect or signal: there is nothing to compare."
         )
-    rows = tuple(_row(key, [own.get(key) for own in found]) for key in keys)
+    whole = {part: key[1] for own in found for s, c, key in pairs(own) for part in (s, c)}
+    rows = tuple(_row(key, [own.get(key) for own in found], whole.get(key, "")) for key in keys)
     settings = tuple(_settings(studies))
     return Comparison(studies, _labels(folders), rows, settings, tuple(_notes(studies, rows)))
 
@@ -151,10 +194,24 @@ def _labels(folders: Sequence[Path]) -> tuple[str, ...]:
     return tuple(names) if len(set(names)) == len(names) else tuple(str(folder) for folder in folders)
 
 
-def _row(key: Key, found: Sequence[tuple[Estimate, str] | None]) -> Row:
+def _with_amplitudes(found: dict[Key, tuple[Estimate, str]]) -> dict[Key, tuple[Estimate, str]]:
+    """The quantities with the amplitudes of ripples before their parts."""
+    made: dict[Key, tuple[Key, tuple[Estimate, str]]] = {}
+    for sine, cosine, key in pairs(found):
+        (s, unit), (c, _) = found[sine], found[cosine]
+        size, stderr = amplitude(s.value, c.value, (s.stderr, c.stderr))
+        made[sine] = key, (Estimate(size, stderr, stderr is not None), unit)
+    ordered: dict[Key, tuple[Estimate, str]] = {}
+    for key, value in found.items():
+        ordered |= dict([made[key]]) if key in made else {}
+        ordered[key] = value
+    return ordered
+
+
+def _row(key: Key, found: Sequence[tuple[Estimate, str] | None], part_of: str) -> Row:
     units = list(dict.fromkeys(item[1] for item in found if item is not None))
     values = tuple(None if item is None else item[0] for item in found)
-    return Row(*key, unit=" or ".join(units), values=values, same_unit=len(units) == 1)
+    return Row(*key, unit=" or ".join(units), values=values, same_unit=len(units) == 1, part_of=part_of)
 
 
 def _difference(first: Estimate, other: Estimate | None) -> Difference | None:
@@ -173,7 +230,9 @@ def _quantities(study: Study) -> Iterator[tuple[Key, tuple[Estimate, str]]]:
     for point in result.get("points", []):
         at = degrees(point["temperature_degC"])
         for name, value in point["parameters"].items():
-            yield ("parameter", name, at), _estimate(value)
+            # The coefficients of a diagnosis' extended model carry the name of their effect.
+            effect = ":" in name and "." in name
+            yield ("effect", name, "") if effect else ("parameter", name, at), _estimate(value)
     if study.whole.kind == "diagnose":
         yield from _of_diagnosis(result)
     if study.whole.kind == "tune":

@@ -1,11 +1,19 @@
 """The page of a comparison: what differs in a sentence, one picture of it, then the tables."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from thsa_cosim.report.compare.difference import NOTABLE_Z, Comparison, Row
-from thsa_cosim.report.compare.tables import TITLES, shown, shown_difference
+from thsa_cosim.report.compare.tables import (
+    TITLES,
+    TREND_COLUMNS,
+    shown,
+    shown_difference,
+    trend_cells,
+)
+from thsa_cosim.report.compare.watch import Trend, told
 from thsa_cosim.report.page.write import Heading, render, write_html
 from thsa_cosim.report.parts import chart
 from thsa_cosim.report.parts.chart import Chart
@@ -15,11 +23,24 @@ from thsa_cosim.report.parts.text import DASH, number, text_cell
 COLUMNS = 3
 
 
-def write_comparison(found: Comparison, target: Path) -> Path:
-    """Write the page of a comparison to ``target``; return it. InputError if it cannot be written."""
+def write_comparison(found: Comparison, target: Path, trends: Sequence[Trend] = ()) -> Path:
+    """Write the page of a comparison, with ``trends`` if any, to ``target``; return it.
+
+    InputError if it cannot be written.
+    """
     title = " and ".join(found.labels) if len(found.labels) < 4 else f"{len(found.labels)} studies"
-    write_html(target, render(Heading("compare", title, "complete"), sections(found)))
+    own = [_trends(trends), *sections(found)] if trends else sections(found)
+    write_html(target, render(Heading("compare", title, "complete"), own))
     return target
+
+
+def _trends(trends: Sequence[Trend]) -> Section:
+    columns = [Column(text, numeric=False) for text in ("quantity", "at", "unit")]
+    columns += [Column(text) for text in TREND_COLUMNS]
+    rows = [[text_cell(c) for c in (t.name, t.at, t.unit, *trend_cells(t))] for t in trends]
+    note = "Expected: what the earlier studies predict for the latest one, with the scatter between them."
+    table = Table("Trends, the studies in the order of time", columns, rows, note)
+    return Section("trends", "Trends", (Text(told(trends), "lead"), table))
 
 
 def sections(found: Comparison) -> list[Section]:

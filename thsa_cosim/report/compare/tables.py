@@ -8,6 +8,7 @@ from rich.text import Text
 
 from thsa_cosim.report.compare.difference import NOTABLE_Z, Comparison, Difference, Estimate
 from thsa_cosim.report.compare.listing import Entry
+from thsa_cosim.report.compare.watch import Trend, told
 from thsa_cosim.report.parts.text import DASH, number, plus_minus
 
 TITLES = {
@@ -40,6 +41,36 @@ def print_comparison(console: Console, found: Comparison) -> None:
         console.print(_settings(found))
     for note in found.notes:
         console.print(Text(f"note: {note}"), highlight=False)
+
+
+def print_trends(console: Console, trends: Sequence[Trend]) -> None:
+    """Print the alarms in a sentence and the trend of every quantity."""
+    console.print(Text(told(trends), style="bold"), highlight=False)
+    table = Table(title="Trends, the studies in the order of time", title_justify="left")
+    table.add_column("quantity", overflow="fold")
+    table.add_column("at")
+    table.add_column("unit")
+    for heading in TREND_COLUMNS:
+        table.add_column(heading, justify="right")
+    for t in trends:
+        cells = (t.name, t.at, t.unit, *trend_cells(t))
+        table.add_row(*(Text(cell, style="bold red" if t.alarm else "") for cell in cells))
+    console.print(table)
+
+
+TREND_COLUMNS = ("latest", "expected", "t", "slope per study", "t", "alarm")
+
+
+def trend_cells(t: Trend) -> tuple[str, ...]:
+    """What `TREND_COLUMNS` name, as text."""
+    return (
+        number(t.latest, 4),
+        plus_minus(t.expected, t.scatter),
+        number(t.jump, 2),
+        plus_minus(t.slope, t.slope_stderr),
+        number(t.drift, 2),
+        t.alarm or DASH,
+    )
 
 
 def _quantities(found: Comparison, group: str, title: str) -> Table:

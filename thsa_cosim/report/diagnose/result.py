@@ -16,6 +16,7 @@ from thsa_cosim.diagnosis.results import (
 )
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.inspection import judge_ratios
+from thsa_cosim.report.diagnose.extended import write_extended_scenario
 from thsa_cosim.report.files import RESULT, write_csv, write_json
 from thsa_cosim.report.page.pictures import write_pictures
 from thsa_cosim.report.signal_files import write_signals
@@ -130,6 +131,8 @@ def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:
         variants = {"measured": c.measured, **{k: s for k, s in models.items() if s is not None}}
         files.append(write_signals(folder, c.part, c.name, variants))
     files += [p for p in (result.model, result.extended_fmu, result.wrapper) if p is not None]
+    if (again := write_extended_scenario(result, folder)) is not None:
+        files.append(again)
     write_json(folder / RESULT, content)
     return [*files, folder / RESULT, *write_pictures(folder)]
 

@@ -40,6 +40,7 @@ def write_identify(
         for path in write_parameter_set(folder, result.parameter_set):
             note(path)
     temperatures = [p.temperature_degC for p in result.points if p.temperature_degC is not None]
+    temperatures += [t for law in result.laws.values() for t in law.between or ()]
     if temperatures:
         for path in write_friction(folder, result.laws, min(temperatures), max(temperatures)):
             note(path)

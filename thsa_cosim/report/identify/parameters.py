@@ -88,8 +88,9 @@ def _draw_law(drawn: Chart, at: tuple[int, int], name: str, content: Json, point
     found = [p["parameters"][name] for p in points]
     values = np.array([e["value"] for e in found], dtype=np.float64)
     errors = 1.96 * np.array([e["stderr"] or 0.0 for e in found], dtype=np.float64)
-    sure = np.array([bool(e["identifiable"]) for e in found])
-    grid = np.linspace(float(t.min()) - 2.0, float(t.max()) + 2.0, 200)
+    sure = np.array([bool(e["identifiable"]) for e in found], dtype=bool)
+    cold, warm = content.get("between") or (float(t.min()) - 2.0, float(t.max()) + 2.0)
+    grid = np.linspace(cold, warm, 200)
     curve, band = law(grid), 1.96 * law.stderr(grid)
     published = content.get("published")
     if np.isfinite(band).all():

@@ -47,6 +47,7 @@ def identify_to_dict(result: IdentifyResult) -> dict[str, Any]:
             "data": result.data.to_dict(),
             "trust": result.trust.to_dict(),
             "notes": list(result.notes),
+            **({} if result.coupling is None else {"coupling": result.coupling.to_dict()}),
         }
     )
     return content
@@ -154,11 +155,10 @@ def _local(point: PointResult) -> dict[str, Any]:
 
 
 def _law(law: LawResult, result: IdentifyResult) -> dict[str, Any]:
-    at = {
-        f"{point.temperature_degC:.1f}": float(law.law(point.temperature_degC))
-        for point in result.points
-        if point.temperature_degC is not None
-    }
+    temperatures = [p.temperature_degC for p in result.points if p.temperature_degC is not None]
+    if law.between is not None:
+        temperatures = np.linspace(*law.between, 9).tolist()
+    at = {f"{t:.1f}": float(law.law(t)) for t in temperatures}
     content: dict[str, Any] = {
         "form": law.law.form,
         "coefficients": list(law.law.coefficients),
@@ -171,6 +171,8 @@ def _law(law: LawResult, result: IdentifyResult) -> dict[str, Any]:
         "identifiable": law.determined,
         "doubts": [asdict(doubt) for doubt in law.doubts],
     }
+    if law.between is not None:
+        content["between"] = list(law.between)
     if law.law.knots:
         content["knots"] = list(law.law.knots)
     if law.published is not None:

@@ -55,7 +55,8 @@ def test_it_counts_what_the_study_then_runs(tmp_path: Path, capsys: pytest.Captu
         ("-30 degC", ["screw_m30"]),
     ]
     assert part["failures"] == {}
-    assert found["seconds"] == pytest.approx(found["runs"] * part["run_s"])
+    assert found["seconds"] == pytest.approx(found["runs"] * part["run_s"] + part["besides_s"])
+    assert part["besides_s"] > 0.0
     assert 0.0 < part["run_s"] < 5.0
 
     assert run(capsys, "identify", scenario, "-o", study, "--quiet", "--workers", 2)[0] == 0

@@ -97,3 +97,15 @@ def test_parameters_that_shape_the_equations_are_fixed_at_export(tmp_path: Path)
     model = causal_model(str(file), tmp_path / "none")
     assert {v.name: v.start for v in model.variables if v.kind == "parameter"} == {"m": 3.0, "fast": 1.0}
     assert model.states == ("x[1]", "x[2]")
+
+
+def test_a_homotopy_between_branches_is_a_named_doubt(tmp_path: Path) -> None:
+    file = tmp_path / "M.mo"
+    file.write_text(
+        "model M Real x(start=1, fixed=true); Real y = homotopy(actual=if x > 2 then 2 else x, simplified=0);\n"
+        "Real z = homotopy(2*x, x); equation der(x) = -x; end M;",
+        encoding="utf-8",
+    )
+    with pytest.warns(UserWarning, match=r"M.mo:1: homotopy\(\) is taken as its actual value") as caught:
+        causal_model(str(file), tmp_path / "none")
+    assert len(caught) == 1

@@ -299,7 +299,7 @@ WRONG = [
     ("fixed/T_amb", 1.0, "fixed.T_amb: 'T_amb' is a input", "[recordings.columns.T_amb]"),
     ("fixed/motor.J", 1.0, "fixed.\"motor.J\" is searched for as parameter 'J'", "remove one"),
     ("recordings/columns/w_n", {"column": "speed"}, "recordings.columns.w_n: Small.fmu has no", "'w_m'"),
-    ("recordings/columns/motor.J", {"column": "speed"}, "is a parameter of Small.fmu", "[fixed]"),
+    ("recordings/columns/motor.J", {"column": "speed"}, "is searched for as parameter 'J'", "remove one"),
     ("recordings/columns/T_amb", ..., "recordings.columns.T_amb is missing: input 'T_amb'", ""),
     ("recordings/columns/i_q", {"value": 1.0}, "recordings.columns.i_q is an output", ""),
     ("temperature/input", "T_amd", "temperature.input: Small.fmu has no variable 'T_amd'", "'T_amb'"),

@@ -18,6 +18,9 @@ SAMPLE = 12
 """Runs that are timed, besides one per worker to warm up."""
 LONG_S = 5.0
 """Where a batch of one run per worker takes longer, it is all that is timed."""
+STARTS = 8.0
+"""What a study takes besides its runs (imports, comparisons, pictures, page), in starts of a worker: 4 to 12 of them in
+the shipped scenarios."""
 RARE = 5.0
 """Runs that take so many times the median count as that long."""
 
@@ -44,6 +47,7 @@ class Forecast:
     added where they do not. Otherwise the runs are the most that can happen.
 
     ``timed`` runs gave ``run_s``, the wall time between two finished runs; ``failures`` of them by reason.
+    ``besides_s`` is what a study takes whatever it runs.
     ``also`` are simulations besides the searches (a map of the cost, held-out recordings, comparisons).
     """
 
@@ -55,6 +59,7 @@ class Forecast:
     run_s: float
     failures: dict[str, int]
     expected: bool = False
+    besides_s: float = 0.0
 
     @property
     def runs(self) -> int:
@@ -64,7 +69,7 @@ class Forecast:
     @property
     def seconds(self) -> float:
         """Wall time, s."""
-        return self.runs * self.run_s
+        return self.besides_s + self.runs * self.run_s
 
 
 Ask = tuple[Experiment, ParameterSpace, str]
@@ -147,9 +152,11 @@ def _timed(
         return drawn
 
     workers = executor.workers
+    begin = time.perf_counter()
     with executor.open_runner(simulation, [experiment for experiment, *_ in chosen]) as runner:
         # The first run of a worker loads the FMU and compiles; the others are what a study is made of.
         runner.run(jobs(workers))
+        started = time.perf_counter() - begin
         outcomes, seconds = _clock(runner.run, jobs(workers))
         if seconds < LONG_S:
             outcomes, seconds = _clock(runner.run, jobs(max(SAMPLE, 2 * workers)))
@@ -162,6 +169,7 @@ def _timed(
         len(outcomes),
         _usual(outcomes, seconds, workers),
         dict(failures),
+        besides_s=STARTS * max(started - _usual(outcomes, seconds, 1), 0.0),
     )
 
 

@@ -104,6 +104,29 @@ def test_a_rival_that_is_better_than_the_winner_is_a_rival(selection: Selection)
     assert names(selection.rivals(scored("a", 0.09), [scored("b", 0.0)], ())) == ["b:motor"]
 
 
+def test_of_several_that_drive_a_parameter_to_its_end_the_best_one_with_all_parameters_fitted_is_kept(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    """Another effect is still missing; what looked best with the declared parameters held is not what is best."""
+    first, second, third = scored("a", 0.3), scored("b", 0.31), scored("c", 0.32)
+    whole = {"a:motor": 0.3, "b:motor": 0.05, "c:motor": 0.2}
+
+    def polished(bench: Any, one: Any, *_: Any) -> Any:
+        found = scored(one.candidate.effect.name, whole[one.candidate.name])
+        found.fit = SimpleNamespace()
+        return found
+
+    monkeypatch.setattr(room, "polish", polished)
+    monkeypatch.setattr(room, "objection", lambda *_: "")
+    monkeypatch.setattr(room, "insignificant", lambda _: "")
+    monkeypatch.setattr(room, "out_of_range", lambda _: "b_m")
+    monkeypatch.setattr(Selection, "evidence", lambda *_: SimpleNamespace(signal_share=1.0, share=1.0))
+    choice, objections = selection.choose([first, second, third], 17.0, first=False)
+    assert choice is not None
+    assert choice.candidate.name == "b:motor"
+    assert [o.split(":")[0] for o in objections] == ["a", "b", "c"]
+
+
 def test_a_lead_that_a_few_blocks_decide_is_chance(selection: Selection):
     winner, other = scored("a", 0.0), scored("b", 0.0)
     other.validate = NOISE + np.where((TIME > 3.0) & (TIME < 4.0), 0.9, 0.0) * SMOOTH

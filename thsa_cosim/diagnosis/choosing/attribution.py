@@ -5,7 +5,7 @@ effect must still be needed beside the others.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
@@ -102,6 +102,8 @@ def attribute(
             rounds.append(
                 _round(selection, left, scan(current), seed + len(rounds), accepted, offered is candidates)
             )
+            if len(rounds) > 1:  # which effects are alike is told by the responses of the first
+                rounds[-1] = replace(rounds[-1], proposals=tuple(p.summary for p in rounds[-1].proposals))
             choice = rounds[-1].accepted
             if choice is None:
                 break

@@ -23,11 +23,10 @@ def largest_gains(base: Fit, proposals: Sequence[Proposal], seed: int, draws: in
     if not proposals:
         return np.zeros(draws)
     orthogonal = Orthogonal(base)
-    left = np.concatenate([orthogonal.remaining(p.response) for p in proposals], axis=1)
-    size = np.sqrt(np.maximum(np.sum(left**2, axis=0, dtype=float), 1e-300))
-    left /= size.astype(left.dtype)
+    products = orthogonal.products([p.response for p in proposals])
+    size = np.sqrt(np.maximum(np.diag(products), 1e-300))
     # White noise pulls at the responses with their Gram matrix as covariance, so the noise itself need not be drawn.
-    correlation = np.asarray(left.T @ left, dtype=float)
+    correlation = products / np.outer(size, size)
     values, vectors = np.linalg.eigh(correlation)
     normal = np.random.default_rng(seed).standard_normal((values.size, draws))
     pull = vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * normal)

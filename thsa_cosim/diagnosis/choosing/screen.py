@@ -7,7 +7,7 @@ residuals that the candidate's best combination promises (the score test, Rao 19
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -21,6 +21,7 @@ from thsa_cosim.signals import FloatArray
 _WANTED = 3.0 * RESPONSE
 _AT_ONCE = 2**29
 """Bytes of residuals that are held before they become responses of half the size."""
+_ROWS = 100_000
 #: Left of a response after orthogonalisation (as a share of its square) below which nothing can be said.
 TESTABLE = 1e-6
 
@@ -54,6 +55,11 @@ class Proposal:
     def is_testable(self) -> bool:
         """Whether it would do anything to the fit recordings, whatever declared parameters can imitate."""
         return bool(np.isfinite(self.response).all() and np.any(self.precision))
+
+    @property
+    def summary(self) -> "Proposal":
+        """The same without its response, which takes megabytes."""
+        return replace(self, response=np.empty((0, self.response.shape[1])))  # a slice would keep it
 
     @property
     def label(self) -> str:
@@ -165,6 +171,18 @@ class Orthogonal:
     def remaining(self, response: FloatArray) -> FloatArray:
         """``response`` (N, k) less what the unknowns imitate."""
         return np.asarray(response - self._jacobian @ self.project(response).astype(np.float32))
+
+    def products(self, responses: Sequence[FloatArray]) -> FloatArray:
+        """(K, K) products of what remains of ``responses`` (N, k) each, side by side; a block of rows at a time."""
+        moves = [self.project(response).astype(np.float32) for response in responses]
+        count = sum(move.shape[1] for move in moves)
+        found = np.zeros((count, count))
+        for first in range(0, self._jacobian.shape[0], _ROWS):
+            rows = slice(first, first + _ROWS)
+            left = [r[rows] - self._jacobian[rows] @ m for r, m in zip(responses, moves, strict=True)]
+            block = np.concatenate(left, axis=1)
+            found += block.T @ block
+        return found
 
 
 def _propose(

@@ -199,7 +199,9 @@ class Selection:
                 why = insignificant(one)
                 if not why and (name := out_of_range(one.fit)):
                     why = f"{one.candidate.name}: it drives the declared parameter {name} to the end of its range"
-                    doubtful = doubtful or one  # another effect that is still missing may do that
+                    # Another effect that is still missing may do that: with all parameters fitted the best one counts.
+                    if doubtful is None or one.held_out_gain > doubtful.held_out_gain:
+                        doubtful = one
             objections.append(why)
             if not why:
                 return one, tuple(objections)

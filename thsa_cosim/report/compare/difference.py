@@ -209,7 +209,7 @@ def _with_amplitudes(found: dict[Key, tuple[Estimate, str]]) -> dict[Key, tuple[
 
 
 def _row(key: Key, found: Sequence[tuple[Estimate, str] | None], part_of: str) -> Row:
-    units = list(dict.fromkeys(item[1] for item in found if item is not None))
+    units = list(dict.fromkeys(item[1] for item in found if item is not None and item[1])) or [""]
     values = tuple(None if item is None else item[0] for item in found)
     return Row(*key, unit=" or ".join(units), values=values, same_unit=len(units) == 1, part_of=part_of)
 
@@ -282,7 +282,10 @@ def _estimate(value: Json) -> tuple[Estimate, str]:
 def _settings(studies: Sequence[Study]) -> Iterator[tuple[str, tuple[str, ...]]]:
     """What was asked differently, key by key, and which verdicts differ; digests by their first digits."""
     each = [_asked(study) for study in studies]
+    one_kind = len({study.whole.kind for study in studies}) == 1
     for name in dict.fromkeys(name for own in each for name in own):
+        if not one_kind and any(name not in own for own in each):
+            continue  # a question that only one kind of study asks
         values = tuple(own.get(name, "") for own in each)
         if len(set(values)) > 1:
             yield name, tuple(v[:12] if _DIGEST.fullmatch(v) else v for v in values)

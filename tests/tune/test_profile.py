@@ -6,15 +6,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import thsa_cosim as tc
 from thsa_cosim.errors import ScenarioError
+from thsa_cosim.report.page import write_page
 from thsa_cosim.scenario import load
 from thsa_cosim.study import study_identity
 from thsa_cosim.tune.problem import build_groups
 
 ROOT = Path(__file__).parents[2]
+RECORDINGS = ROOT / "scenarios" / "recordings"
 
 
 def scenario(**changes: Any) -> dict[str, Any]:
@@ -22,8 +25,7 @@ def scenario(**changes: Any) -> dict[str, Any]:
     content = tomllib.loads((ROOT / "scenarios" / "profile.toml").read_text(encoding="utf-8"))
     content["fmu"] = str(ROOT / "fmus" / "THSA.fmu")
     content["parameter_set"] = str(ROOT / "scenarios" / "parameters" / "identified.ssv")
-    recordings = ROOT / "scenarios" / "recordings"
-    content["profile"]["recordings"] = [str(recordings / "driven_m30_a.parquet")]
+    content["profile"]["recordings"] = [str(RECORDINGS / "driven_m30_a.parquet")]
     content["search"] |= {"population": 5, "generations": 1}
     content["requirements"] = [r for r in content["requirements"] if r["metric"] == "peak"]
     del content["loop"]
@@ -103,6 +105,24 @@ def test_the_content_of_a_recording_is_part_of_what_was_asked(tmp_path: Path) ->
     path.write_text(path.read_text().replace("0.5,9,55,", "0.5,9,54,"))
     second = study_identity(load(content))
     assert {key for key in first if first[key] != second[key]} == {"profile.recordings[ramp]"}
+
+
+def test_damage_of_a_recorded_profile_is_told_but_not_that_its_temperature_moves(tmp_path: Path) -> None:
+    """A sentinel in the load would drive the model with it."""
+    content = scenario()
+    content["profile"]["recordings"] = [str(ramp("warming", tmp_path))]
+    assert load(content).data.findings == ()
+    table = pd.read_parquet(RECORDINGS / "driven_m30_a.parquet")
+    for begin in (2000, 9000, 15000):
+        table.loc[begin : begin + 40, "load_kN"] = -9999.0
+    table.to_parquet(tmp_path / "damaged.parquet")
+    content["profile"]["recordings"] = [str(tmp_path / "damaged.parquet")]
+    content["command"]["stop"] = 2.0
+    study = tc.tune(content, folder=tmp_path / "study", workers=1, quiet=True)
+    data = json.loads((study.folder / "result.json").read_text())["data"]
+    assert ("sentinel", "F_load") in {(f["kind"], f["channel"]) for f in data["findings"]}
+    assert data["verdict"] != "good"
+    assert "Data and trust" in write_page(study.folder).read_text(encoding="utf-8")
 
 
 def remove_profile(content: dict[str, Any]) -> None:

@@ -267,13 +267,12 @@ def conduct(asked: Asked, *, quiet: bool = False) -> Conducted:
 def show_data(asked: Asked, out: "Console") -> None:
     """Print, one line each, what is wrong with the recordings, before anything is simulated."""
     from thsa_cosim.report.inspection import print_inspection
-    from thsa_cosim.scenario import Scenario, StagedScenario
+    from thsa_cosim.scenario import StagedScenario
 
     scenario = asked.scenario
     several = [s.scenario for s in scenario.stages] if isinstance(scenario, StagedScenario) else [scenario]
     for one in several:
-        if isinstance(one, Scenario):
-            print_inspection(out, one.data, notes=False)
+        print_inspection(out, one.data, notes=False)
 
 
 def read_result(folder: Path) -> dict[str, Any] | None:

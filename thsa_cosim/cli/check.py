@@ -124,13 +124,13 @@ def _scenario(path: Path, deadline: float) -> Checked:
     from thsa_cosim.inspection import Inspection
     from thsa_cosim.report.check import print_check
     from thsa_cosim.report.inspection import print_inspection
-    from thsa_cosim.scenario import Scenario, StagedScenario, load
+    from thsa_cosim.scenario import StagedScenario, load
 
     loaded = load(path)
     scenarios = (
         [stage.scenario for stage in loaded.stages] if isinstance(loaded, StagedScenario) else [loaded]
     )
-    of_recordings = [s.data for s in scenarios if isinstance(s, Scenario)]
+    of_recordings = [s.data for s in scenarios]
     findings = tuple(f for data in of_recordings for f in data.findings)
     data = Inspection.of(findings, tuple(s for data in of_recordings for s in data.repairs))
     report = _fmu_of(loaded, deadline)

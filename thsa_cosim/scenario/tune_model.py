@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Literal
 
 from thsa_cosim.fmu import FmuDescription
+from thsa_cosim.inspection import Inspection, inspect
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario.schema import SearchTable, SimulationTable
@@ -213,6 +215,15 @@ class TuneScenario:
     simulation: SimulationTable
     profiles: tuple[Profile, ...] = ()
     kind: str = "tune"
+
+    @cached_property
+    def data(self) -> Inspection:
+        """What an inspection finds in the recorded profiles."""
+        recordings = [profile.recording for profile in self.profiles]
+        found = inspect(recordings, [name for r in recordings for name in r.signals.names])
+        # A profile of temperature is meant to move, and begins where the command does.
+        meant = ("temperature-drift", "moving-start")
+        return replace(found, findings=tuple(f for f in found.findings if f.kind not in meant))
 
     def profile_of(self, shown: Mapping[str, float]) -> Profile | None:
         """The recorded profile of a condition's ``shown`` values, if it has one."""

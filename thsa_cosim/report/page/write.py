@@ -43,7 +43,7 @@ SECTIONS: dict[str, tuple[SectionOf, ...]] = {
     "identify": (data, comparison, convergence, correlation),
     "simulate": (data, comparison),
     "diagnose": (data, attribution, before_after, structure, recordings, candidates, convergence),
-    "tune": (gains, responses, start, plane, schedule, pareto, convergence),
+    "tune": (data, gains, responses, start, plane, schedule, pareto, convergence),
 }
 
 

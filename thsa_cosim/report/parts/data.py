@@ -15,7 +15,7 @@ _VERDICTS = {
 def data(part: Part) -> Section | None:
     """The findings, what was left out by consent, and why a fit is not to be believed; None of older results."""
     result = part.result or {}
-    if "data" not in result or part.kind == "tune":
+    if "data" not in result or (part.kind == "tune" and not result.get("profiles")):
         return None
     found, trust = result["data"], result.get("trust", {"verdict": "explained", "reasons": []})
     blocks: list[Block] = []

@@ -69,8 +69,8 @@ def tune_to_dict(result: TuneResult) -> dict[str, Any]:
             }
             for group in result.groups
         ],
-        # A tuning has no recordings; it believes its model.
-        "data": {"verdict": "good", "findings": []},
+        # A tuning compares nothing with recordings; it believes its model.
+        "data": scenario.data.to_dict(),
         "trust": {"verdict": "explained", "reasons": []},
         "notes": list(result.notes),
     }

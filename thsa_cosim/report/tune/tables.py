@@ -17,6 +17,9 @@ def print_tune(console: Console, result: TuneResult) -> None:
         where = f"worst of {len(result.conditions)} simulations" if many else result.groups[0].label
         title = f"{result.scenario.title} ({where})" if many else result.scenario.title
         console.print(_sets_table(title, sets, result))
+    if result.scenario.profiles:
+        names = [f"{k} = {p.recording.name}" for k, p in enumerate(result.scenario.profiles, 1)]
+        console.print(Text(f"profiles: {', '.join(names)}"), highlight=False)
     if result.line is not None:
         line = result.line
         beside = "" if line.published is None else f"; published {number(line.published)}"

@@ -94,3 +94,18 @@ def test_failures_are_part_of_the_result_unless_all_fail(scenario_file: Path, tm
     scenario_file.write_text(good.replace("tau = 0.1", f"tau = 0.1\nfault = {build.FAULTS['error']}\nat = 0"))
     with pytest.raises(StudyError, match="All 2 simulations failed, 2 of them because fmi2DoStep returned"):
         simulate(load_scenario(scenario_file), Place(tmp_path / "other"))
+
+
+def test_a_signal_that_comes_late_is_named_and_what_fits_has_no_finding(
+    scenario_file: Path, tmp_path: Path
+) -> None:
+    table = pd.read_csv(tmp_path / "first.csv")
+    table["speed"] = table["speed"].shift(4).bfill()
+    table.to_csv(tmp_path / "late.csv", index=False)
+    files = [str(tmp_path / "first.csv"), str(tmp_path / "late.csv")]
+    result = simulate(load_scenario(scenario_file, fit=files, validate=[]), Place(tmp_path / "study"))
+    slips = [f for f in result.data.findings if f.kind == "delay"]
+    assert [(f.recording, f.channel) for f in slips] == [("late", "y")]
+    assert float(slips[0].remedy.rpartition("= ")[2]) == pytest.approx(-0.02, rel=0.1)
+    content = json.loads((tmp_path / "study" / "result.json").read_text())
+    assert "delay" in [f["kind"] for f in content["data"]["findings"]]

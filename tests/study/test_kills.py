@@ -7,6 +7,8 @@ import multiprocessing
 import os
 import random
 import shutil
+import subprocess
+import sys
 import tempfile
 import tomllib
 import zipfile
@@ -18,6 +20,7 @@ from typing import Any
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
+from small_scenario import toml
 
 from thsa_cosim.api.conduct import KINDS, ask
 from thsa_cosim.batch import LocalRunner
@@ -255,3 +258,32 @@ def test_a_machines_fault_stops_the_study_and_leaves_no_row(fault: str, tmp_path
     rows = journal.read_text().splitlines()[1:] if journal.exists() else []
     assert not [row for row in rows if "inf" in row]
     assert run("identify", data, tmp_path / "cut")[0] == whole
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("options", "says"), [("size=1m", "is full"), ("noexec", "noexec")])
+def test_a_real_temporary_folder_that_is_full_or_noexec_stops_the_study(
+    options: str, says: str, tmp_path: Path
+) -> None:
+    """The same command, in a mounted folder that no FMU fits in or can be loaded from, and then elsewhere."""
+    if shutil.which("unshare") is None or subprocess.run(["unshare", "-m", "true"], check=False).returncode:
+        pytest.skip("mounting a folder of its own needs `unshare -m` (root)")
+    place, study, scenario = tmp_path / "place", tmp_path / "study", tmp_path / "screw.toml"
+    place.mkdir()
+    scenario.write_text(toml(screw("differential-evolution")), encoding="utf-8")
+    command = f"{sys.executable} -m thsa_cosim.cli identify {scenario} -o {study} --workers 1 --quiet"
+    mounted = f"mount -t tmpfs -o {options} tmpfs {place} && TMPDIR={place} exec {command}"
+    asked = ["unshare", "-m", "sh", "-c", mounted]
+    done = subprocess.run(asked, capture_output=True, text=True, timeout=300, check=False, cwd=ROOT)
+    if "mount:" in done.stderr:
+        pytest.skip(f"cannot mount here: {done.stderr.strip()}")
+    assert done.returncode == 3, done.stderr
+    assert f"{place} {'is mounted ' if says == 'noexec' else ''}{says}" in " ".join(done.stderr.split())
+    again = subprocess.run(
+        command.split(), capture_output=True, text=True, timeout=300, check=False, cwd=ROOT
+    )
+    assert again.returncode == 0, again.stderr
+    whole = run("identify", screw("differential-evolution"), tmp_path / "whole")[0]
+    found = without_times(json.loads((study / "result.json").read_text(encoding="utf-8")))
+    assert found["points"] == whole["points"]
+    assert found["failures"] == whole["failures"] == {}

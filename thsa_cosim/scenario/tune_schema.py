@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from thsa_cosim.costs.response import RESPONSE_METRICS
 from thsa_cosim.scenario.recording_schema import ColumnTable, TimeTable
 from thsa_cosim.scenario.schema import EvolutionTable, SimulationTable
 from thsa_cosim.scenario.system_schema import ModelTable
@@ -13,11 +14,7 @@ from thsa_cosim.scenario.table import Moderate, Name, NotNegative, Positive, Sha
 
 #: Metric → (unit, scale of an excess that counts as 1); the unit is empty where it follows from the scenario.
 METRICS = {
-    "rise_time": ("s", 0.1),
-    "steady_state_error": ("1", 1e-3),
-    "overshoot": ("1", 0.01),
-    "settling_time": ("s", 0.1),
-    "tracking_error": ("", 1.0),
+    **RESPONSE_METRICS,
     "peak": ("", 1.0),
     "effort": ("", 1.0),
     "gain_margin": ("dB", 10.0),

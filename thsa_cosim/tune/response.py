@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thsa_cosim.costs import control_cost, settling_time
+from thsa_cosim.costs.response import RESPONSE_METRICS, response_metrics
 from thsa_cosim.fmu import FmuDescription, SimulationFailure
 from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.linear import open_loop, state_names
@@ -35,14 +35,7 @@ class Terms:
     def of(cls, scenario: "TuneScenario") -> "Terms":
         """The terms that a scenario asks for."""
         peaks = tuple(dict.fromkeys(r.signal for r in scenario.requirements if r.signal))
-        names = [
-            "tracking",
-            "rise_time",
-            "steady_state_error",
-            "overshoot",
-            "settling_time",
-            "tracking_error",
-        ]
+        names = ["tracking", *RESPONSE_METRICS]
         names += ["effort"] if scenario.metrics.effort else []
         names += [f"peak.{signal}" for signal in peaks]
         names += scenario.start.terms if scenario.start else ()
@@ -131,28 +124,20 @@ class ResponseReducer:
     def __call__(self, signals: Signals) -> FloatArray:
         """Return the terms; velocity errors in units of the cost, times in s, e_ss and overshoot as shares."""
         time, response = signals.time, signals[self.output] * self.factor
-        cost = control_cost(
-            time,
-            response,
-            self.command,
-            kappa_rise=0.0,
-            kappa_steady=0.0,
-            window=self.window,
-            fraction=self.fraction,
-            low=self.low,
-            start=self.begin,
-            scale=self.scale,
+        found = list(
+            response_metrics(
+                time,
+                response,
+                self.command,
+                begin=self.begin,
+                window=self.window,
+                fraction=self.fraction,
+                low=self.low,
+                band=self.settling_band,
+                scale=self.scale,
+                ends_at_most=self.ends_at_most,
+            ).values()
         )
-        final = float(self.command[-1])
-        settled = settling_time(time, response, final, self.settling_band, start=self.begin)
-        of_the_end = (cost.rise_time, cost.overshoot, settled) if self.ends_at_most else (np.nan,) * 3
-        found = [
-            cost.tracking,
-            of_the_end[0],
-            cost.steady_state_error,
-            *of_the_end[1:],
-            float(np.max(np.abs(self.command - response))) / self.scale,
-        ]
         if self.terms.effort is not None:
             found.append(float(np.sqrt(np.mean(signals[self.terms.effort] ** 2))))
         found += [float(np.max(np.abs(signals[name]))) for name in self.terms.peaks]

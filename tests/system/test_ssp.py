@@ -135,14 +135,17 @@ def test_fmpy_reads_and_runs_what_we_write(tmp_path: Path) -> None:
 
     plant, controller = Part("plant", FMUS / "Plant.fmu"), Part("controller", FMUS / "Controller.fmu")
     wires = [Wire("controller.i_ref", "plant.i_ref"), Wire("plant.w_m", "controller.w_m")]
-    system, archives = assemble(
-        "THSA", [controller, plant], wires, {"v_cmd": ["controller.v_cmd"], "v": ["plant.v"]}
-    )
+    # fmpy sets an input that nothing drives to 0, not to its start value: every input is driven.
+    inputs = {"v_cmd": ["controller.v_cmd"], "F_load": ["plant.F_load"], "T_amb": ["plant.T_amb"]}
+    system, archives = assemble("THSA", [controller, plant], wires, {**inputs, "v": ["plant.v"]})
     path = write_ssp(system, archives, tmp_path / "thsa.ssp", DefaultExperiment(0.0, 0.2))
     step = 5e-4
     with np.errstate(all="ignore"):
         found = simulate_ssp(
-            str(path), stop_time=0.2, step_size=step, input={"v_cmd": lambda time: 0.03 * time}
+            str(path),
+            stop_time=0.2,
+            step_size=step,
+            input={"v_cmd": lambda time: 0.03 * time, "F_load": lambda _: 0.0, "T_amb": lambda _: 25.0},
         )
     ours = simulated(path, "v", {}, np.arange(0.0, 0.2, step), {"v_cmd": 0.03})
     theirs = np.interp(np.arange(0.0, 0.2, step), found["time"] + step, found["plant.v"])

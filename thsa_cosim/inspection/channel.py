@@ -23,6 +23,8 @@ _WINDOW, _LEAST_WINDOWS = 64, 6
 _DITHERED = 0.7
 """Noise, in quantisation steps, that no moving signal on a lattice makes up by itself."""
 _MOST_SPANS = 40
+_STRAIGHT, _DRAWN = 1e-6, 0.95
+"""Bend in shares of the range that is rounding, and share of such samples that make a signal a schedule."""
 _JUMP, _OFTEN = 0.02, 0.05
 """Change of a command from sample to sample, in shares of its range, that is a jump; share of samples that are none."""
 _ANSWER = 4.5
@@ -54,7 +56,7 @@ class Channel:
         """Times in s at which a command jumps; none for a sensor's signal, or one that jumps all the time."""
         change = np.abs(np.diff(self.plain))
         large = change > _JUMP * self.range
-        if not self.silent or not 0 < np.count_nonzero(large) < _OFTEN * change.size:
+        if not (self.silent or self.drawn) or not 0 < np.count_nonzero(large) < _OFTEN * change.size:
             return np.empty(0)
         return self.time[1:][large]
 
@@ -94,6 +96,12 @@ class Channel:
     def silent(self) -> bool:
         """Whether nothing but the quantisation can be seen of its noise: a command, a coarse encoder, a simulation."""
         return bool(self.noise <= max(1.01 * self.quantum / np.sqrt(12.0), _SILENT * self.range))
+
+    @cached_property
+    def drawn(self) -> bool:
+        """Whether it consists of straight lines: a schedule of set points and ramps, which no sensor measures."""
+        bends = np.abs(np.diff(self.plain, 2))
+        return bool(bends.size and np.mean(bends <= _STRAIGHT * self.range) > _DRAWN)
 
     @cached_property
     def profile(self) -> FloatArray:

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -80,16 +80,16 @@ def _of_channels(
         if not any(np.array_equal(stamps, axis) for axis in axes):
             axes.append(stamps)
         rising = np.concatenate(([True], np.diff(stamps[kept]) > 0.0))
-        channels.append(
-            Channel(
-                recording=path.stem,
-                name=column.name,
-                unit=column.unit or "1",
-                role="other",
-                time=stamps[kept][rising],
-                values=values[kept][rising],
-            )
+        channel = Channel(
+            recording=path.stem,
+            name=column.name,
+            unit=column.unit or "1",
+            role="other",
+            time=stamps[kept][rising],
+            values=values[kept][rising],
         )
+        # Nobody says here what drives the model; a schedule can only be a command.
+        channels.append(replace(channel, role="input") if channel.drawn else channel)
     return list(inspect_channels(path.stem, channels, axes))
 
 

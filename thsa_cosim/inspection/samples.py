@@ -33,7 +33,7 @@ def dependent_samples(channel: Channel) -> Iterator[Finding]:
         return
     table, own = 1.0 / channel.step, 1.0 / (channel.step * found.period)
     rates = f"{own:.4g} Hz in a {table:.4g} Hz table"
-    command = channel.role == "input" and (channel.held or channel.silent)
+    command = channel.role == "input" and (channel.held or channel.silent or channel.drawn)
     severity: Severity = "note" if command else "warning"
     remedy = "" if channel.role == "input" else f"[recordings.columns.{channel.name}]\nindependent = true"
     if found.kind == "held":

@@ -16,7 +16,7 @@ _TOOLS = ("casadi", "fmpy", "ziglang")
 
 
 def export_digest(source: str, package: Path, platforms: Sequence[str] | None) -> str:
-    """Digest of all that an FMU is made from: class, package, platforms, and the exporter with its tools."""
+    """Digest of all that an FMU is made from: class, package, platforms, front end, exporter and their tools."""
     tools = {"thsa-cosim": __version__}
     for tool in _TOOLS:
         try:
@@ -24,10 +24,12 @@ def export_digest(source: str, package: Path, platforms: Sequence[str] | None) -
         except PackageNotFoundError:  # exporting will say so
             continue
     # Not imported for that: only an export itself needs the exporter.
-    package_folder = Path(thsa_cosim.__file__).parent
-    exporter = digest_of_folder(package_folder / "export", ["*.py", "*.c", "*.h"])
+    exporter = [
+        digest_of_folder(Path(thsa_cosim.__file__).parent / room, ["*.py", "*.c", "*.h"])
+        for room in ("modelica", "export")
+    ]
     return digest_of_text(
-        source, digest_of_folder(package, MODELICA), json.dumps([platforms, tools], sort_keys=True), exporter
+        source, digest_of_folder(package, MODELICA), json.dumps([platforms, tools], sort_keys=True), *exporter
     )
 
 

@@ -218,9 +218,8 @@ def noexec(monkeypatch: pytest.MonkeyPatch, temporary: Path) -> Callable[[], Non
 
     def mounted(path: Any) -> Any:
         found = real(path)
-        return SimpleNamespace(
-            f_flag=found.f_flag | os.ST_NOEXEC, f_bavail=found.f_bavail, f_frsize=found.f_frsize
-        )
+        fields = {name: getattr(found, name) for name in dir(found) if name.startswith("f_")}
+        return SimpleNamespace(**{**fields, "f_flag": found.f_flag | os.ST_NOEXEC})
 
     monkeypatch.setattr(os, "statvfs", mounted)
     return lambda: None

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.signals import Signals
-from thsa_cosim.system import open_plant, read_description, unpack
+from thsa_cosim.system import SystemPlant
 from thsa_cosim.system.assemble import Part, Wire, assembled
 from thsa_cosim.system.frequency_response import FrequencyResponse, loop_response
 from thsa_cosim.tune.margins import margins_of
@@ -44,23 +43,18 @@ def measured(sampling: float | None, delay: float, step: float | None) -> Freque
     controller = Part("controller", FMUS / "Controller.fmu", how, sampling, delay)
     plant = Part("plant", FMUS / "Plant.fmu", "continuous" if step is None else "coupled", step)
     path = assembled("sampling", [controller, plant], WIRES, CONNECTORS)
-    scratch = ScratchFolder()
-    try:
-        unpack(path, scratch.path / "system")
-        with open_plant(read_description(path), scratch.path / "system") as opened:
-            return loop_response(
-                opened,
-                GAINS,
-                STEADY,
-                target="controller.w_m",
-                disturbance="w_disturbance",
-                at=1.0,
-                interval=MS,
-                amplitude=1.0,
-                tolerance=1e-7,
-            )
-    finally:
-        scratch.remove()
+    with SystemPlant.open(path) as opened:
+        return loop_response(
+            opened,
+            GAINS,
+            STEADY,
+            target="controller.w_m",
+            disturbance="w_disturbance",
+            at=1.0,
+            interval=MS,
+            amplitude=1.0,
+            tolerance=1e-7,
+        )
 
 
 def main() -> None:

@@ -14,7 +14,7 @@ from thsa_cosim.fmu import SimulationFailure
 from thsa_cosim.fmu.description import DefaultExperiment
 from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.signals import FloatArray, Signals
-from thsa_cosim.system import open_plant, read_description, unpack
+from thsa_cosim.system import SystemPlant, open_plant, read_description, unpack
 from thsa_cosim.system.assemble import Part, Wire, assemble
 from thsa_cosim.system.structure import checked
 from thsa_cosim.system.write import write_ssp
@@ -46,13 +46,8 @@ def run(
 ) -> Signals:
     system, archives = assemble("ring", parts, wires, connectors or {})
     path = write_ssp(system, archives, folder / "ring.ssp", DefaultExperiment(0.0, 1.0))
-    scratch = ScratchFolder()
-    try:
-        unpack(path, scratch.path / "system")
-        with open_plant(read_description(path), scratch.path / "system") as plant:
-            return plant.run(values, inputs, outputs, time, tolerance=tolerance)
-    finally:
-        scratch.remove()
+    with SystemPlant.open(path) as plant:
+        return plant.run(values, inputs, outputs, time, tolerance=tolerance)
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,8 @@ from fmu_sources import build
 
 from thsa_cosim.fmu import SimulationFailure
 from thsa_cosim.fmu.description import DefaultExperiment
-from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.signals import Signals
-from thsa_cosim.system import open_plant, read_description, unpack
+from thsa_cosim.system import SystemPlant
 from thsa_cosim.system.assemble import Part, Wire, assemble
 from thsa_cosim.system.frequency_response import FrequencyResponse, loop_response
 from thsa_cosim.system.write import write_ssp
@@ -29,24 +28,19 @@ def measured(folder: Path, controller: Part, gain: float, interval: float = INTE
     plant = Part("plant", build.lag2())
     system, archives = assemble("loop", [controller, plant], wires, {})
     path = write_ssp(system, archives, folder / "loop.ssp", DefaultExperiment(0.0, 1.0))
-    scratch = ScratchFolder()
-    try:
-        unpack(path, scratch.path / "system")
-        with open_plant(read_description(path), scratch.path / "system") as opened:
-            assert "d" in [v.name for v in opened.description.inputs]
-            return loop_response(
-                opened,
-                {"plant.tau": TAU},
-                STEADY,
-                target="controller.u",
-                disturbance="d",
-                at=0.5,
-                interval=interval,
-                amplitude=0.1,
-                tolerance=1e-9,
-            )
-    finally:
-        scratch.remove()
+    with SystemPlant.open(path) as opened:
+        assert "d" in [v.name for v in opened.description.inputs]
+        return loop_response(
+            opened,
+            {"plant.tau": TAU},
+            STEADY,
+            target="controller.u",
+            disturbance="d",
+            at=0.5,
+            interval=interval,
+            amplitude=0.1,
+            tolerance=1e-9,
+        )
 
 
 @pytest.mark.parametrize("late", [0.0, 0.5, 1.0])

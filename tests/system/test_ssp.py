@@ -11,9 +11,8 @@ from fmu_sources import build
 from system.test_coupled import RING, TIME, VALUES, ring
 from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu.description import DefaultExperiment
-from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.signals import FloatArray, Signals
-from thsa_cosim.system import open_plant, read_description, unpack
+from thsa_cosim.system import SystemPlant, read_description
 from thsa_cosim.system.assemble import Part, Wire, assemble
 from thsa_cosim.system.write import write_ssp
 
@@ -83,13 +82,8 @@ def simulated(
     inputs = (
         Signals(time, {n: r * time for n, r in rates.items()}, dict.fromkeys(rates, "1")) if rates else None
     )
-    scratch = ScratchFolder()
-    try:
-        unpack(path, scratch.path / "system")
-        with open_plant(read_description(path), scratch.path / "system") as plant:
-            return plant.run(values, inputs, [output], time, tolerance=1e-9)[output]
-    finally:
-        scratch.remove()
+    with SystemPlant.open(path) as plant:
+        return plant.run(values, inputs, [output], time, tolerance=1e-9)[output]
 
 
 def test_a_nested_system_with_bindings_mapping_and_transformation_is_the_flat_one(tmp_path: Path) -> None:

@@ -42,6 +42,9 @@ class Plant(Closing):
     a separate process. Open one Plant at a time per process: many FMUs corrupt each other's instances.
     """
 
+    _read = staticmethod(read_description)
+    _unpack = staticmethod(unpack)
+
     def __init__(
         self,
         description: FmuDescription,
@@ -118,11 +121,11 @@ class Plant(Closing):
         FmuError
             If the file is no usable FMU or lacks ``kind``.
         """
-        description = read_description(path)
+        description = cls._read(path)
         scratch = ScratchFolder()
         folder = scratch.path / "fmu"
         try:
-            unpack(Path(path), folder)
+            cls._unpack(Path(path), folder)
             return cls(
                 description,
                 folder,

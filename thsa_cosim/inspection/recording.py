@@ -61,7 +61,8 @@ def inspect_channels(
         yield from time_findings(recording, time)
     usable = [c for c in channels if c.values.size >= _LEAST and c.plain.min() < c.plain.max()]
     jumps = np.unique(np.concatenate([np.empty(0), *(c.jumps for c in usable if c.role != "output")]))
-    usable = [replace(c, commanded=jumps) for c in usable]
+    if jumps.size:  # a copy finds all of its facts anew
+        usable = [replace(c, commanded=jumps) for c in usable]
     for channel in usable:
         for detect in CHANNEL_DETECTORS:
             yield from detect(channel)

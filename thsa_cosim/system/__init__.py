@@ -7,8 +7,9 @@
 ``instance``     all components as one instance that the integrator runs; ``plant`` opens it
 
 ``read_description``, ``unpack`` and ``open_plant`` take an FMU or a system; the rooms above ask no further.
+``SystemPlant.open`` opens an SSP archive in this process, as ``Plant.open`` does an FMU.
 """
 
-from thsa_cosim.system.plant import open_plant, read_description, unpack
+from thsa_cosim.system.plant import SystemPlant, open_plant, read_description, unpack
 
-__all__ = ["open_plant", "read_description", "unpack"]
+__all__ = ["SystemPlant", "open_plant", "read_description", "unpack"]

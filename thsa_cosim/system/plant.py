@@ -46,6 +46,9 @@ def unpack(path: Path, folder: Path) -> Path:
 class SystemPlant(Plant):
     """An opened system of FMUs; used like a :class:`Plant`."""
 
+    _read = staticmethod(read_description)
+    _unpack = staticmethod(unpack)
+
     def _new_instance(self) -> Instance:
         assert isinstance(self.description, SystemDescription)
         return SystemInstance(self.folder, self.description, self.kind, self._on_message)

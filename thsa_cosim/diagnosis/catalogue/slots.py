@@ -1,20 +1,15 @@
 """The effect slots of a model: which places it offers, and the units there.
 
-A slot is a replaceable component at the top level of a Modelica class, named ``<place>Effect`` and constrained by one
-of the partial blocks of ``THSA.Interfaces``.
+A slot is a replaceable component at the top level of a Modelica class, its own or inherited, named ``<place>Effect`` and
+constrained by one of the partial blocks of ``THSA.Interfaces``.
 """
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from thsa_cosim.errors import ModelicaError
-from thsa_cosim.export.flatten import flatten, locate
-
-SLOT = re.compile(
-    r"\breplaceable\s+[\w.]+\s+(\w+)Effect\b(?:[^;\"]|\"[^\"]*\")*?\bconstrainedby\s+(?:\w+\.)*(\w+)"
-)
+from thsa_cosim.export.flatten import components, flatten, locate
 
 #: Per interface the connector variables that an effect reads, those that it gives, and the scales' variables.
 INPUTS: Mapping[str, tuple[str, ...]] = {
@@ -61,10 +56,14 @@ class Slot:
 
 
 def find_slots(model: str, package: Path) -> tuple[Slot, ...]:
-    """The slots that a Modelica class declares itself; ModelicaError if it has none."""
+    """The free slots that a Modelica class declares or inherits; ModelicaError if it has none."""
     file, name = locate(model, package)
-    text = re.sub(r"//.*|/\*.*?\*/", " ", file.read_text(encoding="utf-8"), flags=re.S)
-    declared = [(m[1], m[2]) for m in SLOT.finditer(text) if m[2] in INPUTS]
+    declared = [
+        (component.name.removesuffix("Effect"), interface)
+        for component in components(model, package).values()
+        if "replaceable" in component.prefixes and component.name.endswith("Effect") and component.constraint
+        if (interface := component.constraint[0].rsplit(".", 1)[-1]) in INPUTS
+    ]
     if not declared:
         raise ModelicaError(
             f"{file}: class {name} has no effect slot (a replaceable component <place>Effect constrained by a block of"

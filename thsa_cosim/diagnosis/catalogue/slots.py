@@ -1,6 +1,6 @@
 """The effect slots of a model: which places it offers, and the units there.
 
-A slot is a replaceable component at the top level of a Modelica class, its own or inherited, named ``<place>Effect`` and
+A slot is a replaceable component at the top level of a Modelica class, own or inherited, named ``<place>Effect`` and
 constrained by one of the partial blocks of ``THSA.Interfaces``.
 """
 
@@ -20,6 +20,7 @@ INPUTS: Mapping[str, tuple[str, ...]] = {
     "TorqueConstantEffect": ("i_q",),
     "VoltageEffect": ("i_q",),
     "SensorEffect": ("u",),
+    "PhaseEffect": ("i_q", "phi"),
 }
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "FrictionEffect": ("F",),
@@ -29,6 +30,7 @@ OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "TorqueConstantEffect": ("g_t", "g_e"),
     "VoltageEffect": ("du",),
     "SensorEffect": ("d",),
+    "PhaseEffect": ("d", "du"),
 }
 SCALES: Mapping[str, Mapping[str, str]] = {
     "FrictionEffect": {"V": "v", "Z": "z", "F": "N"},
@@ -38,7 +40,10 @@ SCALES: Mapping[str, Mapping[str, str]] = {
     "TorqueConstantEffect": {"I": "i_q"},
     "VoltageEffect": {"I": "i_q"},
     "SensorEffect": {"I": "u"},
+    "PhaseEffect": {"I": "i_q"},
 }
+#: The position over which effects may repeat, of the interfaces that have one whose residual is searched for it.
+POSITION: Mapping[str, str] = {"FrictionEffect": "z", "PhaseEffect": "phi"}
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,17 @@ class Slot:
     def component(self) -> str:
         """Name of the component in the model."""
         return self.name + "Effect"
+
+    @property
+    def position(self) -> str | None:
+        """FMU variable of the position over which effects here may repeat, if there is one."""
+        own = POSITION.get(self.interface)
+        return None if own is None else f"{self.component}.{own}"
+
+    @property
+    def is_angular(self) -> bool:
+        """Whether that position is an angle."""
+        return self.units.get(POSITION.get(self.interface, "")) == "rad"
 
 
 def find_slots(model: str, package: Path) -> tuple[Slot, ...]:

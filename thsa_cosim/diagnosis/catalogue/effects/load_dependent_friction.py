@@ -30,8 +30,8 @@ EFFECT = Effect(
     name="load-dependent-friction",
     title="Friction in proportion to the load that the pair carries",
     physics="F = (mu + mu_S exp(-(|v|/v_S)^n_S) + mu_v |v| + mu_2 |N|) |N| sgn(v) + mu_A N sgn(v) + mu_D N sgn(v)^2",
-    source="Coulomb; Lemor, SNAME 1996 (roller screws); Vahid-Araghi and Golnaraghi, Friction-Induced Vibration in Lead Screw"
-    " Drives (2011); Duclusaud et al., ICRA 2025 (gears, models m3 to m6)",
+    source="Coulomb; Lemor, SNAME 1996 (roller screws); Vahid-Araghi and Golnaraghi, Friction-Induced Vibration in"
+    " Lead Screw Drives (2011); Duclusaud et al., ICRA 2025 (gears, models m3 to m6)",
     signature="current grows with the load beyond the declared lossless transmission",
     variants=(
         _variant(MU, beside=False),

@@ -29,9 +29,15 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_verdict(name: str):
     structure, significance, accepted, tested, expected = CASES[name]
-    shown = ChannelError(9.0, 2.0, 2.0 * structure, significance, 1000)
+    shown = ChannelError(6.0, 2.0, 2.0 * structure, significance, 1000)
     assert verdict_on({"v": NOTHING, "i": shown}, accepted, tested) == expected
     assert verdict_on({"i": shown, "v": NOTHING}, accepted, tested) == expected
+
+
+def test_a_gross_error_is_no_noise_even_where_few_samples_make_it():
+    gross = ChannelError(6.1, 2.0, 6.0, 1.5, 1000)
+    assert verdict_on({"v": NOTHING, "i": gross}, 0, 40) == "unexplained-structure"
+    assert verdict_on({"v": NOTHING, "i": gross}, 1, 40) == "missing-effect"
 
 
 def test_the_share_that_is_left_is_that_of_the_worst_signal_that_shows_anything():

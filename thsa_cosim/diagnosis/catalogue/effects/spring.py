@@ -11,7 +11,9 @@ def force(p: Values, at: Connectors) -> FloatArray:
     return np.asarray(p["c"] * at["z"] + p["F_0"])
 
 
-STIFFNESS = EffectParameter("c", "F/Z", 0.02, "stiffness")
+def _variant(parameter: EffectParameter, beside: bool) -> Variant:
+    return Variant("FrictionEffect", "Spring", (parameter,), law=force, beside=beside)
+
 
 EFFECT = Effect(
     name="spring",
@@ -20,12 +22,7 @@ EFFECT = Effect(
     source="Hooke; Altintas, Verl, Brecher, Uriarte, Pritschow, CIRP Annals 60 (2011) 779: feed drives",
     signature="current that depends on the position and not on the direction, at rest too",
     variants=(
-        Variant("FrictionEffect", "Spring", (STIFFNESS,), law=force),
-        Variant(
-            "FrictionEffect",
-            "Spring",
-            (STIFFNESS, EffectParameter("F_0", "F", 0.02, "force at position zero")),
-            law=force,
-        ),
+        _variant(EffectParameter("c", "F/Z", 0.02, "stiffness"), beside=False),
+        _variant(EffectParameter("F_0", "F", 0.02, "force at position zero"), beside=True),
     ),
 )

@@ -96,7 +96,8 @@ def machine_of(slots: Sequence[Slot], signals: Mapping[str, Signals]) -> Machine
 
 
 def _positions(slot: Slot, signals: Mapping[str, Signals]) -> list[np.ndarray]:
-    return [run[slot.position] for run in signals.values() if slot.position in run]
+    name = slot.position
+    return [run[name] for run in signals.values() if name is not None and name in run]
 
 
 def name_by_order(candidate: Candidate, order: Order | None) -> str:

@@ -1,7 +1,8 @@
 """Size of an installation: a wheel of this checkout in fresh environments, without extras and with each that is named.
 
-``python benchmarks/size.py`` prints MB (10^6 bytes of all files, links not counted twice) by extra, and the largest packages
-of each; ``--demo`` runs ``thsa-cosim demo`` in the last one, in an empty folder with empty caches. It needs a package index.
+``python benchmarks/size.py`` prints MB (10^6 bytes of all files, links not counted twice) by extra, and the largest
+packages of each; ``--demo`` runs ``thsa-cosim demo`` in the last one, in an empty folder with empty caches. It needs a
+package index.
 """
 
 import argparse

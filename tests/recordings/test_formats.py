@@ -101,9 +101,9 @@ def test_parquet_durations_zones_dates_and_booleans(tmp_path):
         tmp_path / "run.parquet",
         duration=pa.array(ms, pa.duration("ms")),
         zoned=pa.array(instants, pa.timestamp("ms", tz="Europe/Berlin")),
-        day=pa.array(np.arange(200), pa.date32()),
+        day=pa.array(np.arange(200), pa.int32()).cast(pa.date32()),
         flag=pa.array([None if k == 5 else k % 2 == 0 for k in range(200)]),
-        time_of_day=pa.array(ms, pa.time32("ms")),
+        time_of_day=pa.array(ms, pa.int32()).cast(pa.time32("ms")),
         note=pa.array(["x"] * 200).dictionary_encode(),
         pair=pa.array([[1.0, 2.0]] * 200),
     )

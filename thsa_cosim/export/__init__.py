@@ -51,7 +51,8 @@ def export_fmu(
     start_values:
         Start values of parameters that replace those of the model, in the model's units.
     platforms:
-        What to compile for, by the names of FMI 2.0 or 3.0 (``win64``, ``x86_64-linux``, …); default all (this machine's, without ziglang).
+        What to compile for, by the names of FMI 2.0 or 3.0 (``win64``, ``x86_64-linux``, …); default all, or this
+        machine's where its own compiler is the only one.
     libraries:
         Further Modelica libraries: packages' folders, folders of packages (such as a Modelica tool's library folder) or
         ``.mo`` files; those of the environment variable MODELICAPATH follow. Only what the class uses is read.

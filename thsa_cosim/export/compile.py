@@ -126,12 +126,12 @@ def _keep(library: Path, kept: Path) -> None:
 
 def available_platforms() -> tuple[Platform, ...]:
     """What can be built for here: every platform with ziglang, else this machine."""
-    return PLATFORMS if _ziglang() else (native_platform(),)
+    return PLATFORMS if ziglang_version() else (native_platform(),)
 
 
 def _compiler(platform: Platform) -> tuple[list[str], str]:
     """The command that compiles for ``platform``, and its version."""
-    if version := _ziglang():
+    if version := ziglang_version():
         return [sys.executable, "-m", "ziglang", "cc", "-target", platform.target], version
     own = host_compiler() if platform == native_platform() and platform.suffix != ".dll" else None
     if own is None:
@@ -139,7 +139,7 @@ def _compiler(platform: Platform) -> tuple[list[str], str]:
     return [own], _version(own)
 
 
-def _ziglang() -> str | None:
+def ziglang_version() -> str | None:
     """Version of the ziglang wheel; None when it is not installed."""
     try:
         return metadata.version("ziglang")

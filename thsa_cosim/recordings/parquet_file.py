@@ -24,6 +24,12 @@ from thsa_cosim.signals import FloatArray
 
 _WHOLE = ("TINYINT", "SMALLINT", "INTEGER", "BIGINT", "UTINYINT", "USMALLINT", "UINTEGER", "UBIGINT")
 _NUMBERS = (*_WHOLE, "BOOLEAN", "FLOAT", "DOUBLE", "DECIMAL")
+_TIME_UNITS = {
+    na.TimeUnit.SECOND: "s",
+    na.TimeUnit.MILLI: "ms",
+    na.TimeUnit.MICRO: "us",
+    na.TimeUnit.NANO: "ns",
+}
 _KINDS = {"VARCHAR": "string", "BLOB": "binary"}
 
 
@@ -55,6 +61,9 @@ def read_columns(path: Path, choose: Choose) -> dict[str, ParquetColumn]:
         if read:
             listed = ", ".join(f"{expression} AS c{k}" for k, expression in enumerate(read))
             arrays = list(database.execute(f"SELECT {listed} FROM {_TABLE}", [source]).fetchnumpy().values())
+            stated = database.execute("SELECT num_rows FROM parquet_file_metadata(?)", [source]).fetchall()
+            if [len(values) for values in arrays] != [stated[0][0]] * len(chosen):
+                raise ValueError("it holds another number of rows than it states")
     columns = {}
     for name, place, kind, values in zip(chosen, places, kinds, arrays, strict=True):
         field = arrow[place] if arrow else None
@@ -74,9 +83,12 @@ def read_metadata(path: Path) -> dict[str, str]:
 def write_columns(path: Path, columns: Mapping[str, FloatArray], metadata: Mapping[str, str]) -> None:
     """Write columns of doubles (n,) and the file's metadata; NaN becomes null.
 
-    Of two names that differ only in case the second gets a number: write the names into the metadata as well.
+    Of names that differ only in case all but the first get a number: write the names into the metadata as well.
     """
-    table = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()}
+    table: dict[str, FloatArray] = {}
+    for number, (name, values) in enumerate(columns.items()):
+        taken = name.casefold() in {other.casefold() for other in table}
+        table[f"{name} ({number})" if taken else name] = np.asarray(values, dtype=np.float64)
     facts = ", ".join(f"{_quoted(key)}: {_text(value)}" for key, value in metadata.items())
     with _duckdb() as database:
         database.register("written", table)
@@ -178,7 +190,7 @@ def _plain(values: Any, kind: str, field: Any) -> NDArray[Any] | None:
         return None
     if field is not None and field.type == na.Type.DURATION:
         whole = np.ma.filled(values, np.iinfo(np.int64).min)
-        return np.asarray(whole).view(f"timedelta64[{field.unit}]").astype("timedelta64[ns]")
+        return np.asarray(whole).view(f"timedelta64[{_TIME_UNITS[field.unit]}]").astype("timedelta64[ns]")
     return np.asarray(np.ma.filled(values.astype(np.float64), np.nan))
 
 

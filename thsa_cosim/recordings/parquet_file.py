@@ -121,7 +121,7 @@ def _duckdb() -> Iterator[duckdb.DuckDBPyConnection]:
 
 @cache
 def _database() -> duckdb.DuckDBPyConnection:
-    """One database in memory, one thread, no files beside it, no extensions from the network."""
+    """One database in memory, one thread, no temporary files, no extensions from the network."""
     return duckdb.connect(
         ":memory:",
         config={

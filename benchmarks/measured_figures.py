@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import thsa_cosim as tc
+from thsa_cosim.recordings import Column, TimeAxis, read_recording
 
 mpl.use("Agg")
 mpl.rcParams.update(
@@ -36,7 +37,9 @@ MEASURED, DECLARED, EXTENDED = "0.2", "#c77a35", "#1f639b"
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "docs" / "measured")
-    parser.add_argument("--studies", type=Path, default=None, help="folder of the studies; default: a temporary one")
+    parser.add_argument(
+        "--studies", type=Path, default=None, help="folder of the studies; default: a temporary one"
+    )
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
     if given.studies is not None:
@@ -76,13 +79,15 @@ def servo(study: Any) -> Figure:
     """Position in the eight held-out runs: measured, by the declared model, with what the diagnosis added."""
     figure = Figure(figsize=(9.6, 3.9))
     axes = figure.subplots(2, 4, sharex=True)
-    names = [n for n in study.recordings.index.unique() if "kp200" in n or "kp800" in n]
+    names = [n for n in study.files if "kp200" in n or "kp800" in n]
     for axis, name in zip(axes.flat, sorted(names), strict=True):
         table = study.signals(name)
         time = table.index.to_numpy()
-        axis.plot(time, table["q.measured"], color=MEASURED, lw=1.5, label="measured")
-        axis.plot(time, table["q.before"], color=DECLARED, lw=0.9, label="declared model")
-        axis.plot(time, table["q.after"], color=EXTENDED, lw=0.9, label="with load-dependent friction")
+        axis.plot(time, column(table, "q", "measured"), color=MEASURED, lw=1.5, label="measured")
+        axis.plot(time, column(table, "q", "before"), color=DECLARED, lw=0.9, label="declared model")
+        axis.plot(
+            time, column(table, "q", "after"), color=EXTENDED, lw=0.9, label="with load-dependent friction"
+        )
         _, gain, kind = name.split("_", 2)
         axis.set_title(f"gain {gain.removeprefix('kp')}, {kind}", fontsize=8)
     for axis in axes[:, 0]:
@@ -97,24 +102,23 @@ def servo(study: Any) -> Figure:
 
 def cogging(study: Any) -> Figure:
     """Current over one turn of the held-out record, and the amplitude of what is left per order."""
-    (name,) = [n for n in study.recordings.index.unique() if "rolling2" in n]
+    (name,) = [n for n in study.files if "rolling2" in n]
     table = study.signals(name)
-    recording = tc.read_recording(SCENARIOS / "recordings" / "cogging_rolling2.parquet")
-    turns = np.interp(table.index.to_numpy(), *angle_of(recording)) / (2.0 * np.pi)
+    turns = turns_at(table.index.to_numpy(), SCENARIOS / "recordings" / "cogging_rolling2.parquet")
     figure = Figure(figsize=(9.6, 2.5))
     wave, orders = figure.subplots(1, 2, width_ratios=[1.5, 1.0])
     one = (turns >= 5.0) & (turns < 6.0)
-    for column, colour, label in (
-        ("i_q.measured", MEASURED, "measured"),
-        ("i_q.before", DECLARED, "declared model"),
-        ("i_q.after", EXTENDED, "with cogging, orders 12 and 36"),
+    for source, colour, label in (
+        ("measured", MEASURED, "measured"),
+        ("before", DECLARED, "declared model"),
+        ("after", EXTENDED, "with cogging, orders 12 and 36"),
     ):
-        wave.plot(turns[one] - 5.0, table[column][one], color=colour, lw=1.0, label=label)
+        wave.plot(turns[one] - 5.0, column(table, "i_q", source)[one], color=colour, lw=1.0, label=label)
     wave.set(xlabel="turns", ylabel="current [A]", ylim=(0.0, 0.22))
     wave.legend(frameon=False, ncols=3, loc="upper right", fontsize=7)
     number = np.arange(1, 145)
-    for column, colour in (("i_q.before", DECLARED), ("i_q.after", EXTENDED)):
-        left = (table["i_q.measured"] - table[column]).to_numpy()
+    for source, colour in (("before", DECLARED), ("after", EXTENDED)):
+        left = column(table, "i_q", "measured") - column(table, "i_q", source)
         wanted = np.exp(-2j * np.pi * number[:, None] * turns)
         orders.plot(number, 2.0 * np.abs(wanted @ (left - left.mean())) / left.size, color=colour, lw=1.0)
     orders.set(xlabel="periods per turn of the motor", ylabel="amplitude left [A]", xticks=range(0, 145, 12))
@@ -122,11 +126,18 @@ def cogging(study: Any) -> Figure:
     return figure
 
 
-def angle_of(recording: Any) -> tuple[Any, Any]:
-    """Time and unwrapped angle [rad] of a record of the motor, both from its first sample."""
-    time = np.asarray(recording["t"], dtype=float)
-    angle = np.unwrap(np.asarray(recording["position"], dtype=float))
-    return time - time[0], np.abs(angle - angle[0])
+def column(table: Any, signal: str, source: str) -> Any:
+    """A signal of a study's table, (n,): its columns are named with the unit, ``(i_q [A], measured)``."""
+    (name,) = [n for n in table.columns if n[0].split(" [")[0] == signal and n[1] == source]
+    return table[name].to_numpy()
+
+
+def turns_at(time: Any, file: Path) -> Any:
+    """Turns of the motor since its first sample at ``time`` (n,), from the measured angle."""
+    columns = {"phi": Column("position", "rad")}
+    recorded = read_recording(file, columns, time=TimeAxis("t", "s"), units={"phi": "rad"}).signals
+    angle = np.interp(time, recorded.time, recorded["phi"])
+    return np.abs(angle - angle[0]) / (2.0 * np.pi)
 
 
 def compensation(before: Any, after: Any) -> Figure:
@@ -136,11 +147,11 @@ def compensation(before: Any, after: Any) -> Figure:
     for axis, study, title in zip(
         axes, (before, after), ("before", "after the compensation is switched on"), strict=True
     ):
-        table = study.signals(study.recordings.index[0])
+        table = study.signals(next(iter(study.files)))
         part = table[(table.index >= 1.0) & (table.index <= 2.5)]
-        axis.plot(part.index, part["w.measured"], color=MEASURED, lw=1.0, label="measured")
+        axis.plot(part.index, column(part, "w", "measured"), color=MEASURED, lw=1.0, label="measured")
         label = "model with cogging, identified from this half"
-        axis.plot(part.index, part["w.simulated"], color=EXTENDED, lw=1.0, label=label)
+        axis.plot(part.index, column(part, "w", "simulated"), color=EXTENDED, lw=1.0, label=label)
         axis.set(xlabel="time [s]", title=title)
     axes[0].set_ylabel("speed [rad/s]")
     axes[0].legend(frameon=False, fontsize=7, loc="upper right")

@@ -25,6 +25,7 @@ from thsa_cosim.report.parts.comparison import comparison
 from thsa_cosim.report.parts.content import Block, Figure, Fold, Section
 from thsa_cosim.report.parts.convergence import convergence
 from thsa_cosim.report.parts.data import data
+from thsa_cosim.report.parts.evaluations import evaluated
 from thsa_cosim.report.parts.failures import failures
 from thsa_cosim.report.parts.provenance import provenance
 from thsa_cosim.report.tune.gains import gains
@@ -40,10 +41,10 @@ SectionOf = Callable[[Part], Section | None]
 
 #: Sections of a part by kind of study, in the order of the page.
 SECTIONS: dict[str, tuple[SectionOf, ...]] = {
-    "identify": (data, comparison, convergence, correlation),
+    "identify": (data, comparison, convergence, evaluated, correlation),
     "simulate": (data, comparison),
-    "diagnose": (data, attribution, before_after, structure, recordings, candidates, convergence),
-    "tune": (data, gains, responses, start, plane, schedule, pareto, convergence),
+    "diagnose": (data, attribution, before_after, structure, recordings, candidates, convergence, evaluated),
+    "tune": (data, gains, responses, start, plane, schedule, pareto, convergence, evaluated),
 }
 
 

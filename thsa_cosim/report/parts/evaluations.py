@@ -19,8 +19,8 @@ from thsa_cosim.tune.combine import INFEASIBLE
 SHOWN = 200
 #: Shares of the feasible vectors, best first, with their names and colours.
 _GROUPS = (
-    (0.5, "other half", "var(--band)"),
-    (0.1, "better half", chart.INK),
+    (0.5, "other half", "var(--rule)"),
+    (0.1, "better half", chart.MEASURED),
     (0.0, "best tenth", chart.SIMULATED),
 )
 
@@ -106,7 +106,7 @@ def _coordinates(
     order = np.argsort(costs)
     rest = order[np.unique(np.linspace(0, costs.size - 1, min(SHOWN, costs.size)).astype(int))]
     rank = np.argsort(order) / costs.size
-    columns = np.column_stack([vectors, costs])
+    columns = np.column_stack([vectors, costs / costs[order[0]]])
     scaled, ends = zip(*(_axis(column) for column in columns.T), strict=True)
     heights = np.column_stack([*scaled, np.full(costs.size, np.nan)])[rest]
     drawn = Chart(f"{part.prefix}coordinates-{list(_searches(part)).index(label)}", row_height=300)
@@ -117,30 +117,41 @@ def _coordinates(
         upper = least
         if inside.any():
             lines = heights[inside]
-            style = {"colour": colour, "width": 1.0, "extra": {"hoverinfo": "skip"}}
-            drawn.line(np.tile(across, len(lines)), lines.ravel(), name, **style)
+            skip = {"hoverinfo": "skip"}
+            drawn.line(np.tile(across, len(lines)), lines.ravel(), name, colour=colour, width=1.0, extra=skip)
     best = order[0]
     texts = [f"{name} = {number(value)}" for name, value in zip((*names, "cost"), columns[best], strict=True)]
-    style = {"colour": chart.MEASURED, "joined": True, "size": 6, "labels": texts}
     drawn.points(
-        across[:-1], heights[0, :-1], "best", **style, extra={"hovertemplate": "%{text}<extra></extra>"}
+        across[:-1],
+        heights[0, :-1],
+        "best",
+        colour=chart.PUBLISHED,
+        joined=True,
+        size=6,
+        labels=texts,
+        extra={"hovertemplate": "%{text}<extra></extra>"},
     )
     ticks = [
-        f"{chart.plain(name)}<br>{number(low, 2)}<br>to {number(high, 2)}"
+        f"{chart.plain(name)}<br>{_short(high)}<br>{_short(low)}"
         for name, (low, high) in zip((*names, "cost"), ends, strict=True)
     ]
     axis = {
         "tickvals": across[:-1].tolist(),
         "ticktext": ticks,
-        "range": [-0.25, across[-2] + 0.25],
+        "range": [-0.4, across[-2] + 0.4],
         "tickangle": 0,
     }
     drawn.axes(x="", y="", x_options=axis, y_options={"showticklabels": False, "range": [-0.04, 1.04]})
     shown = "every feasible vector" if costs.size <= SHOWN else f"{SHOWN} of {costs.size} feasible vectors"
-    text = (
-        f"Parallel coordinates of {search_label(label)}: {shown}, each axis over the values that were tried"
+    return drawn.build(
+        f"Parallel coordinates of {search_label(label)}: {shown}. Below each axis stand the highest and the lowest"
+        " value that were tried; the cost is a multiple of the best. An axis that spans a factor of 30 is logarithmic."
     )
-    return drawn.build(f"{text}; logarithmic where they span a factor of 30.")
+
+
+def _short(value: float) -> str:
+    """Two digits; 5 axes have to fit on a telephone."""
+    return number(value, 2).replace("e+0", "e").replace("e-0", "e-")
 
 
 def _axis(values: FloatArray) -> tuple[FloatArray, tuple[float, float]]:
@@ -156,7 +167,7 @@ def _axis(values: FloatArray) -> tuple[FloatArray, tuple[float, float]]:
 def _importance(part: Part, names: tuple[str, ...], searches: dict[str, list[JournalRow]]) -> list[Block]:
     found = {label: importances(*_numbers(part, rows)) for label, rows in searches.items()}
     known = {label: it for label, it in found.items() if it is not None}
-    if not known:
+    if 2 * len(known) < len(found):
         text = (
             "No importances: a quadratic model of the cost does not describe what was evaluated well enough."
         )
@@ -164,14 +175,16 @@ def _importance(part: Part, names: tuple[str, ...], searches: dict[str, list[Jou
     shares = np.array([it.shares for it in known.values()])
     drawn = Chart(f"{part.prefix}importance", row_height=220)
     order = np.argsort(-np.median(shares, axis=0))
-    drawn.bars([names[k] for k in order], np.median(shares, axis=0)[order].tolist(), "")
+    drawn.bars(
+        [names[k] for k in order], np.median(shares, axis=0)[order].tolist(), "", colour=chart.SERIES[0]
+    )
     drawn.axes(x="", y="importance [1]", y_range=(0.0, 1.0))
     least = min(it.explained for it in known.values())
     of = "" if len(found) == 1 else f" (median of {len(known)} searches of {len(found)})"
     return [
         drawn.build(
             f"Importance of each parameter for the cost{of}: what a quadratic model of its logarithm, fitted to the"
-            " evaluated vectors, loses without the parameter, as a share of all. On vectors that were left out of its fit"
-            f" the model explains at least {100.0 * least:.0f} % of the variance."
+            " evaluated vectors, loses without the parameter, as a share of all. On vectors that were left out of its"
+            f" fit the model explains at least {100.0 * least:.0f}\u00a0% of the variance."
         )
     ]

@@ -52,20 +52,19 @@ def _terms(parameters: int) -> int:
 
 def _scaled(values: FloatArray) -> FloatArray:
     """Values (n,) of one parameter with mean 0 and spread 1, logarithmic where they span a factor of 30."""
-    if values.min() > 0.0 and values.max() > 30.0 * values.min():
-        values = np.log(values)
-    spread = float(np.std(values))
-    return (values - values.mean()) / spread if spread > 0.0 else np.zeros_like(values)
+    logarithmic = values.min() > 0.0 and values.max() > 30.0 * values.min()
+    drawn = np.asarray(np.log(values) if logarithmic else values, dtype=np.float64)
+    spread = float(np.std(drawn))
+    return np.asarray((drawn - drawn.mean()) / spread if spread > 0.0 else 0.0 * drawn, dtype=np.float64)
 
 
 def _features(scaled: FloatArray) -> FloatArray:
     pairs = [scaled[:, i] * scaled[:, j] for i in range(scaled.shape[1]) for j in range(i + 1)]
-    return np.column_stack([np.ones(len(scaled)), scaled, *pairs])
+    return np.asarray(np.column_stack([np.ones(len(scaled)), scaled, *pairs]), dtype=np.float64)
 
 
 def _fit(features: FloatArray, target: FloatArray) -> FloatArray:
-    found: FloatArray = np.linalg.lstsq(features, target, rcond=1e-8)[0]
-    return found
+    return np.asarray(np.linalg.lstsq(features, target, rcond=1e-8)[0], dtype=np.float64)
 
 
 def _cross_validated(scaled: FloatArray, target: FloatArray) -> float:

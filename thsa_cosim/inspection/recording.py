@@ -14,6 +14,7 @@ from thsa_cosim.inspection.samples import dependent_samples, resolution, sentine
 from thsa_cosim.inspection.spectrum import hum
 from thsa_cosim.inspection.stretches import clipped, repeated, stuck
 from thsa_cosim.inspection.time_axis import time_findings
+from thsa_cosim.inspection.time_unit import time_unit
 from thsa_cosim.recordings import Recording
 from thsa_cosim.signals import FloatArray
 
@@ -67,6 +68,7 @@ def inspect_channels(
         for detect in CHANNEL_DETECTORS:
             yield from detect(channel)
     yield from across_findings(usable)
+    yield from time_unit(recording, usable)
 
 
 def _channel(recording: Recording, name: str, driven: bool) -> Channel:

@@ -300,7 +300,7 @@ class _Search:
     def _hidden(self) -> list[Finding]:
         """Gains of sensors that the fit cannot see, where the parameters differ from the drawing in that way."""
         spec = self._scenario
-        found = []
+        found: list[Finding] = []
         for k, search in sorted(self._found.items()):
             if search.result is not None and search.jacobian is not None:
                 own = expected_values(search.result, self._points[k].space, spec.laws, spec.fmu, spec.zeroed)

@@ -3,7 +3,8 @@
 ``finding``  a finding, and all of them with their verdict
 ``file``     a recording's file without a scenario
 ``recording`` all detectors over a scenario's recordings; they stand in ``time_axis`` and, by what they look at,
-             in ``samples``, ``outliers``, ``stretches``, ``spectrum``, ``course``, ``across`` and ``time_unit``
+             in ``samples``, ``outliers``, ``stretches``, ``spectrum``, ``jumps``,
+             ``course``, ``across``, ``pairs`` and ``time_unit``
 ``trust``    whether a fit leaves nothing but noise
 ``misfit``   which slip of a signal explains what a fit leaves
 ``hidden``   which gain of a sensor a fit cannot see, because parameters take it up

@@ -62,9 +62,9 @@ def hidden_gains(residuals: Sequence[Residual], parameters: Sequence[Expected]) 
 def _gain(
     parameters: Sequence[Expected], change: FloatArray
 ) -> tuple[float, list[tuple[Expected, float]]] | None:
-    """Gain less 1 that accounts for the distances from the drawing, and what it does to each parameter; None if none.
+    """By how much what is measured is too large, relative to itself, and what that does to each parameter; None if not.
 
-    ``change`` (p,): of each parameter per unit of gain.
+    ``change`` (p,): of each parameter per unit of that. It accounts for the distances from the drawing.
     """
     known = [
         (p, float(c), p.expected, p.stderr)
@@ -90,12 +90,15 @@ def _gain(
 def _finding(
     residuals: Sequence[Residual], channel: str, gain: float, taken: Sequence[tuple[Expected, float]]
 ) -> Finding:
+    factor = 1.0 / (1.0 - gain)  # the values, and what follows from them, have it already
     changes = " and ".join(f"{p.name} by {100.0 * change / (p.value - change):+.2g} %" for p, change in taken)
     text = (
-        f"a gain of {1.0 + gain:.3g} in the sensor of {channel} would leave no trace in this fit: it would change"
+        f"a gain of {factor:.3g} in the sensor of {channel} would leave no trace in this fit: it would change"
         f" {changes}, and that is how they differ from the expected values; calibrate {channel} before you use them"
     )
     recording = next(r.recording for r in residuals if r.channel == channel)
     severity: Severity = "warning" if len(taken) > 1 else "note"
-    remedy = f"[recordings.columns.{channel}]\nscale = {1.0 / (1.0 + gain):.4g}  # only if a calibration confirms it"
+    remedy = (
+        f"[recordings.columns.{channel}]\nscale = {1.0 / factor:.4g}  # only if a calibration confirms it"
+    )
     return Finding(recording, channel, "gain", severity, text, (), remedy)

@@ -36,7 +36,7 @@ _SMALL = 0.3
 _SHORT = 0.3
 """Sampling steps below which a delay is the sampling's own."""
 _UNEVEN, _HOP = 1.15, 0.3
-"""Mean step around a moment in usual ones, and share of its range that a signal goes in one, where sampling is coarse."""
+"""Mean step around a moment in usual ones, share of its range that a signal goes in one step: coarse sampling."""
 _LAGS = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 32.0, 50.0, 80.0)
 _STEPS = 24
 _MOST_SLOPES = 20
@@ -244,7 +244,7 @@ def _in_file(offset: float, unit: str, file_unit: str | None) -> str:
 def own_delay(time: FloatArray, simulated: FloatArray) -> float:
     """Return the longest delay, in s, that the sampling itself makes of a command that changes between two samples.
 
-    A controller changes it at its own samples; where some are lost, or the answer is too fast for them, nobody knows when.
+    A controller changes it at its own samples: where some are lost, or the answer is too fast, nobody knows when.
     """
     steps = np.diff(time)
     usual, mean = float(np.median(steps)), float(np.sum(steps**2) / np.sum(steps))

@@ -22,6 +22,8 @@ _COUNTED = 0.5
 """s between stamps that are whole numbers, from which on they may count samples or milliseconds."""
 _LEAST_JUMPS, _CLEAR = 3, 10.0
 """Jumps that have to agree, and σ that each of them has to move the signal by."""
+_FIRST_DAY, _LAST_DAY = 36_000.0, 60_000.0
+"""Days since 1899-12-30 of the years 1998 to 2064."""
 _MECHANICAL = ("m/s", "rad/s", "m", "rad")
 _ELECTRICAL = ("A", "V")
 _WARMED = 2.5
@@ -107,6 +109,11 @@ def _by_samples(drive: Sequence[Channel], mechanical: Sequence[Channel]) -> tupl
     dense = [c for c in mechanical if c.step < _DENSE and c.values.size >= 100]
     if dense:
         name, step = dense[0].name, dense[0].step
+        if _FIRST_DAY < dense[0].time[0] < _LAST_DAY:
+            return (
+                f"time begins at {dense[0].time[0]:.6g}, a day's number in a spreadsheet: it is in days, not s",
+                "d",
+            )
         rate = f"samples of {name} are {step:.3g} s apart ({1e-6 / step:.3g} MHz)"
         return (
             f"{rate}, {np.ptp(dense[0].time):.3g} s in all: time seems to be in s, and is read as less",
@@ -119,7 +126,12 @@ def _by_counting(channels: Sequence[Channel], drive: Sequence[Channel]) -> tuple
     """Stamps that count."""
     channel = drive[0]
     time, step = channel.time, channel.step
-    if step < _COUNTED or time.size < 100 or not np.array_equal(time - time[0], np.round(time - time[0])):
+    counts = time - time[0]
+    if (
+        step < _COUNTED
+        or time.size < 100
+        or np.max(np.abs(counts - np.round(counts))) > 1e-6 * np.max(counts)
+    ):
         return None
     warm = [c for c in channels if _is(c, ("K",)) and float(np.ptp(c.clean)) > _WARMED + 8.0 * c.noise]
     if warm:

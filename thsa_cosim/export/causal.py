@@ -134,7 +134,7 @@ class _Builder:
         for variable in flat.variables.values():
             self._sort(variable)
         self.translator.discrete = frozenset(v.name for v in (*self.parameters, *self.dependents))
-        self.system = EquationSystem(self.time, frozenset(v.name for v in self.inputs))
+        self.system = EquationSystem(self.time, frozenset(v.name for v in self.inputs), self._parameter)
 
     def _sort(self, variable: FlatVariable) -> None:
         name, symbols = variable.name, self.symbols
@@ -202,6 +202,11 @@ class _Builder:
             ):
                 return True
         return False
+
+    def _parameter(self, name: str) -> float | None:
+        """Default value of a parameter that a symbol stands for; None for what is no parameter, or found initially."""
+        known = {v.name for v in (*self.parameters, *self.dependents)}
+        return self._value(name) if name in known else None
 
     def _value(self, name: str, pending: tuple[str, ...] = ()) -> float:
         """Default value of a parameter or constant."""

@@ -4,7 +4,7 @@ The unknowns y of all blocks live at the end of the cache, so that the next solu
 R(y, v) = 0 the derivative of a function f(y, v) is f_v + f_y S, S = -R_y^-1 R_v, whose numbers are found at run time.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
@@ -117,8 +117,12 @@ class Implicit:
     def _residual(
         self, graph: Graph, symbols: dict[str, str], name: str, block: Block, y: str, extra: str
     ) -> list[str]:
-        """``static int name(const Point *at, double *f, double *jacobian)``."""
-        f = [(f"f[{i}]", node) for i, node in enumerate(graph.add_column(block.residual))]
+        """``static int name(const Point *at, double *f, double *jacobian)``; of a linear block f is -residual(0)."""
+        residual = block.residual
+        if block.linear:
+            zeros = ca.SX.zeros(block.unknown.numel())
+            residual = -ca.substitute([residual], [block.unknown], [zeros])[0]
+        f = [(f"f[{i}]", node) for i, node in enumerate(graph.add_column(residual))]
         matrix = ca.jacobian(block.residual, block.unknown)
         jac = [(f"jacobian[{i}]", node) for i, node in enumerate(graph.add_column(matrix))]
         lines = [
@@ -138,8 +142,12 @@ class Implicit:
         lines = [f"  double work[{largest * (largest + 4)}];", f"  int pivot[{largest}];"]
         offset = 0
         for k, block in enumerate(blocks):
-            n = block.unknown.numel()
-            lines.append(f"  if (newton_solve({n}, {y} + {offset}, {prefix}{k}, &at, work, pivot)) return 1;")
+            n, part = block.unknown.numel(), f"{y} + {offset}"
+            if block.linear:
+                direct = f"{prefix}{k}(&at, {part}, work) || newton_linear({n}, 1, work, {part}, pivot)"
+                lines.append(f"  if ({direct}) return 1;")
+            else:
+                lines.append(f"  if (newton_solve({n}, {part}, {prefix}{k}, &at, work, pivot)) return 1;")
             offset += n
         return lines
 
@@ -222,4 +230,4 @@ def _symbols(name: str, rows: int, columns: int) -> ca.SX:
 
 
 def _dense(block: Block) -> Block:
-    return Block(block.names, block.unknown, block.residual, ca.densify(block.guess))
+    return replace(block, guess=ca.densify(block.guess))

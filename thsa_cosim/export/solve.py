@@ -1,6 +1,7 @@
 """The equation system of one model: state selection, block order and symbolic solution."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -15,20 +16,26 @@ STABILIZATION = 10.0  # 1/s
 
 @dataclass(frozen=True)
 class Block:
-    """Equations that are solved by Newton's method while the model runs: ``residual(unknown) = 0``."""
+    """Equations that are solved while the model runs: ``residual(unknown) = 0``, by Newton's method from the last
+    solution, or ``linear`` ones directly, which leaves no rounding noise where the solution is exactly 0.
+    """
 
     names: tuple[str, ...]
     unknown: ca.SX
     residual: ca.SX
     guess: ca.SX
+    linear: bool = False
 
 
 class EquationSystem:
     """Variables (by name) and residual equations; grows while constraints are differentiated."""
 
-    def __init__(self, time: ca.SX, inputs: frozenset[str]) -> None:
+    def __init__(
+        self, time: ca.SX, inputs: frozenset[str], parameter: Callable[[str], float | None] | None = None
+    ) -> None:
         self.time = time
         self.inputs = inputs
+        self.parameter = parameter or (lambda name: None)  # value of a parameter by name; None for what is none
         self.names: list[str] = []
         self.symbols: dict[str, ca.SX] = {}
         self.residuals: list[ca.SX] = []
@@ -302,9 +309,10 @@ class _Solver:
         unknown = ca.vertcat(*[self.system.symbols[n] for n in names])
         matrix = ca.jacobian(residual, unknown)
         linear = not ca.depends_on(matrix, unknown)
-        if linear and matrix.is_constant() and np.linalg.matrix_rank(np.array(ca.DM(matrix))) < len(names):
+        if linear and self._singular(matrix):
+            given = "" if matrix.is_constant() else " with the parameters as they are"
             raise ModelicaError(
-                f"{self.model}: singular: {', '.join(names[:6])} cannot be solved from {listed}."
+                f"{self.model}: singular{given}: {', '.join(names[:6])} cannot be solved from {listed}."
             )
         if linear and len(names) <= LARGEST_SYMBOLIC:
             constant = ca.substitute([residual], [unknown], [ca.SX.zeros(len(names))])[0]
@@ -320,6 +328,15 @@ class _Solver:
             symbols.append(self.system.symbols[name])
             values.append(self.solution[name])
 
+    def _singular(self, matrix: ca.SX) -> bool:
+        """Whether a matrix of numbers and parameters has no inverse; False where it depends on anything else."""
+        symbols = ca.symvar(matrix)
+        values = [self.system.parameter(str(symbol)) for symbol in symbols]
+        if any(value is None for value in values):
+            return False
+        numbers = np.array(ca.evalf(ca.substitute([matrix], symbols, [ca.SX(v) for v in values])[0]))
+        return not np.isfinite(numbers).all() or bool(np.linalg.matrix_rank(numbers) < len(numbers))
+
     def _reduced(self, residual: ca.SX, names: list[str], linear: bool) -> None:
         unknown = ca.vertcat(*[self.system.symbols[n] for n in names])
         if linear and len(names) <= LARGEST_SYMBOLIC:
@@ -332,7 +349,7 @@ class _Solver:
         residual = ca.substitute([residual], [unknown], [ca.vertcat(*fresh)])[0]
         self.solution.update(zip(names, fresh, strict=True))
         guess = [self.guesses.get(n, ca.SX(0)) if self.guesses else ca.SX(0) for n in names]
-        self.blocks.append(Block(tuple(names), ca.vertcat(*fresh), residual, ca.vertcat(*guess)))
+        self.blocks.append(Block(tuple(names), ca.vertcat(*fresh), residual, ca.vertcat(*guess), linear))
 
 
 def _torn(

@@ -155,7 +155,7 @@ class Evaluator:
         branches, otherwise = expression.args
         conditions: list[tuple[Scalar, Value]] = []
         for condition, branch in branches:
-            chosen = self.value(condition)
+            chosen = self.folded(self.value(condition), condition)
             if chosen is False:
                 continue
             if chosen is True:
@@ -174,6 +174,15 @@ class Evaluator:
         for condition, branch_value in reversed(conditions):
             result = self.select(condition, branch_value, result, expression)
         return result
+
+    def folded(self, condition: Scalar, expression: Syntax) -> Scalar:
+        """A condition on parameters alone by their values, if the translation fixes what shapes the equations."""
+        if not (self.scope.world.folded and isinstance(condition, Term) and self.parameters_only([condition])):
+            return condition
+        variables = self.scope.world.variables
+        if any("fixed" in variables[n].attributes for n in names(condition)):
+            return condition
+        return bool(self.fixed(condition, expression, "a condition"))
 
     def by_default(self, condition: Scalar) -> bool | None:
         """What a condition on parameters that are no Reals is before they are set; None for other conditions."""

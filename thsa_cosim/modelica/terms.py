@@ -141,6 +141,8 @@ def _simplified(op: str, args: tuple[Scalar, ...]) -> Scalar | None:
         if a is True or b is True:
             return True
         return b if a is False else a if b is False else None
+    if op == "noEvent" and not isinstance(args[0], Term):
+        return args[0]
     if op == "not" and isinstance(args[0], Term) and args[0].op == "not":
         return args[0].args[0]
     if op == "if":

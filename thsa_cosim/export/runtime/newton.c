@@ -19,7 +19,7 @@ int newton_linear(int n, int columns, double *matrix, double *b, int *pivot) {
         pivot[k] = best;
         if (!(fabs(col[best]) > 0.0) || col[best] - col[best] != 0.0) return 1;
         if (best != k)
-            for (int j = 0; j < n; j++) {
+            for (int j = k; j < n; j++) { /* factors found already stay: the right sides are swapped in this order, too */
                 const double swap = matrix[j * n + k];
                 matrix[j * n + k] = matrix[j * n + best];
                 matrix[j * n + best] = swap;

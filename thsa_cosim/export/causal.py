@@ -9,9 +9,10 @@ from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export.discrete import referenced, split_discrete
 from thsa_cosim.export.domain import with_domains
 from thsa_cosim.export.expression import Translator
-from thsa_cosim.export.solve import Block, EquationSystem
+from thsa_cosim.export.solve import HOMOTOPY, Block, EquationSystem
+from thsa_cosim.export.uniqueness import several_solutions
 from thsa_cosim.modelica.flat import Assertion, FlatEquation, FlatModel, FlatVariable
-from thsa_cosim.modelica.terms import Scalar, Term, plain, substitute, text
+from thsa_cosim.modelica.terms import Scalar, Term, make, plain, substitute, text, walk
 
 
 @dataclass(frozen=True)
@@ -245,11 +246,16 @@ class _Builder:
         for variable in self.unknowns:
             system.add_variable(variable.name, self.symbols[variable.name], self._preference(variable))
         for equation in self.split.equations:
-            system.add_equation(self._translated(equation), str(equation), equation.place)
+            row = system.add_equation(self._translated(equation), str(equation), equation.place)
+            self._simplify(row, equation)
         for variable in self.unknowns:
             if variable.binding is not None:
-                bound = self._at(variable.place, Term("-", (Term("ref", (variable.name,)), variable.binding)))
-                system.add_equation(bound, f"{variable.name} = {text(variable.binding)}", variable.place)
+                reference = Term("ref", (variable.name,))
+                bound = self._at(variable.place, Term("-", (reference, variable.binding)))
+                row = system.add_equation(
+                    bound, f"{variable.name} = {text(variable.binding)}", variable.place
+                )
+                self._simplify(row, FlatEquation(reference, variable.binding, variable.place))
         dependent = self._dependent_values()
         initial_equations = [(self._translated(e), str(e)) for e in self.split.initial_equations]
         self._updates()
@@ -264,6 +270,13 @@ class _Builder:
                     system.derivative(variable.name)
         states = system.prepare(self.flat.name)
         solution = system.solve(self.flat.name)
+        for block in system.blocks:
+            if several_solutions(block, self._parameter):
+                raise ModelicaError(
+                    f"{self.flat.name}: the loop of {', '.join(block.names[:4])} has several solutions at once "
+                    "(positive feedback through noEvent()), of which the exporter cannot tell the right one; let the "
+                    "relation make events, or put a state (a capacity, a filter) into the loop."
+                )
         initial = self._initial(states, initial_equations)
         unknown = [system.symbols[n] for n in solution]
         solved = list(solution.values())
@@ -321,6 +334,22 @@ class _Builder:
             return self.translator.real(equation.left) - self.translator.real(equation.right)
         except ModelicaError as error:
             raise ModelicaError(f"{equation.place}: in the equation {equation}: {error}") from error
+
+    def _simplify(self, row: int, equation: FlatEquation) -> None:
+        """Note what an equation with homotopy() is on the way from the simplified to the actual initial system."""
+        if not any(term.op == "homotopy" for term in walk((equation.left, equation.right))):
+            return
+
+        def along(term: Term) -> Scalar | None:
+            if term.op != "homotopy":
+                return None
+            actual, simplified = (make("noEvent", substitute(a, along, {})) for a in term.args)
+            return make("+", actual, make("*", Term("ref", (HOMOTOPY,)), make("-", simplified, actual)))
+
+        if HOMOTOPY not in self.symbols:
+            self.symbols[HOMOTOPY] = ca.SX.sym(HOMOTOPY)
+        sides = [substitute(side, along, {}) for side in (equation.left, equation.right)]
+        self.system.simplified[row] = self._at(equation.place, make("-", *sides))
 
     def _at(self, place: str, value: Scalar) -> ca.SX:
         try:
@@ -391,6 +420,10 @@ class _Builder:
     def _first_indicators(self, indicators: ca.SX, x: ca.SX, initial: "_Initial") -> ca.SX:
         """Event indicators at the start values, from which the search for the initial values sets out."""
         modes = {str(mode) for mode in self.translator.modes}
+        if modes and self.system.simplified:  # they follow from where the simplified initial system leads to
+            known = [self.system.symbols[n] for n in initial.solution]
+            raw = column(self.translator.indicators)
+            return ca.substitute([raw], known, list(initial.solution.values()))[0]
         if not initial.blocks and not {str(s) for s in ca.symvar(initial.x)} & modes:
             return ca.SX(0, 1)
         unknown = [b.unknown.nz[i] for b in self.system.blocks for i in range(b.unknown.numel())]
@@ -482,6 +515,7 @@ class _Builder:
             y_start=column([solution[n] for b in system.blocks for n in b.names]),
             free={n: solution[n] for n in free},
             guesses=guesses,
+            solution=solution,
         )
 
 
@@ -496,6 +530,7 @@ class _Initial:
     y_start: ca.SX
     free: dict[str, ca.SX]
     guesses: dict[str, ca.SX]
+    solution: dict[str, ca.SX]
 
 
 class _Table:

@@ -152,6 +152,8 @@ class Translator:
             return select(condition, self.real(args[1], events), self.real(args[2], events))
         if op == "noEvent":
             return self.real(args[0], events=False)
+        if op == "homotopy":
+            return self.real(args[0], events)
         if op in ("start", "smooth"):
             return self.real(args[-1], events)
         if op in ("max", "min", "abs", "sign"):

@@ -11,7 +11,9 @@ import casadi as ca
 from thsa_cosim.export.causal import CausalModel, column
 from thsa_cosim.export.emit import statements
 from thsa_cosim.export.graph import Graph
-from thsa_cosim.export.solve import Block
+from thsa_cosim.export.solve import HOMOTOPY, Block
+
+STEPS = 20  # of the way from the simplified to the actual initial system
 
 _POINT = "double t, const double *x, const double *u, const double *p, const double *d, const double *m"
 
@@ -53,6 +55,9 @@ class Implicit:
                 self.symbols[block.unknown.nz[i].name()] = f"y0[{offset + i}]"
             offset += block.unknown.numel()
         self.initial_size = offset
+        self.homotopy = any(str(s) == HOMOTOPY for b in model.initial_blocks for s in ca.symvar(b.residual))
+        if self.homotopy:  # how far the system is simplified lies behind its unknowns
+            self.symbols[HOMOTOPY] = f"y0[{offset}]"
 
     def total(self, function: ca.SX, over: ca.SX, rates: ca.SX) -> ca.SX:
         """Jacobian of a function with y following."""
@@ -67,20 +72,21 @@ class Implicit:
 
     def begin(self, name: str) -> list[str]:
         """The first statements of a function: bring y, and its derivatives, up to date."""
-        if name in ("dependent", "samples", "first_indicators"):
+        if name in ("dependent", "samples") or (name == "first_indicators" and not self.homotopy):
             return []
-        if name in ("initial", "discrete_start"):
+        if name in ("initial", "discrete_start", "first_indicators"):
             lines = []
             if self.initial_size:
                 lines = [
-                    f"  double y0[{self.initial_size}];",
+                    f"  double y0[{self.initial_size + self.homotopy}];",
                     "  if (solve_initial(t, u, p, d, m, x_start, y0)) return 1;",
                 ]
-            if self.size:
+            if self.size and name != "first_indicators":
                 lines.append("  double *v = implicit_of(d);")
                 if name == "discrete_start":
                     lines.append("  if (solve(t, x, u, p, d, m)) return 1;")
-            return [*lines, "  (void)v;"] if self.size else lines
+                lines.append("  (void)v;")
+            return lines
         if not self.size:
             return []
         lines = ["  double *v = implicit_of(d);", "  (void)v;", "  if (solve(t, x, u, p, d, m)) return 1;"]
@@ -137,10 +143,14 @@ class Implicit:
         lines += statements(graph, jac, symbols, {})
         return [*lines, "  }", "  return 0;", "}", ""]
 
-    def _calls(self, blocks: tuple[Block, ...], prefix: str, y: str) -> list[str]:
+    @staticmethod
+    def _declared(blocks: tuple[Block, ...]) -> list[str]:
         largest = max(b.unknown.numel() for b in blocks)
-        lines = [f"  double work[{largest * (largest + 4)}];", f"  int pivot[{largest}];"]
-        offset = 0
+        return [f"  double work[{largest * (largest + 4)}];", f"  int pivot[{largest}];"]
+
+    @staticmethod
+    def _calls(blocks: tuple[Block, ...], prefix: str, y: str) -> list[str]:
+        lines, offset = [], 0
         for k, block in enumerate(blocks):
             n, part = block.unknown.numel(), f"{y} + {offset}"
             if block.linear:
@@ -161,6 +171,7 @@ class Implicit:
             f"static int solve({_POINT}) {{",
             "  double *v = implicit_of(d);",
             "  const Point at = {t, x, u, p, d, m, v};",
+            *self._declared(self.model.blocks),
             *self._calls(self.model.blocks, "block_", "v"),
             "  return 0;",
             "}",
@@ -186,12 +197,25 @@ class Implicit:
             "  const Point at = {t, x_start, u, p, d, m, y0};",
             "  (void)u; (void)p; (void)d; (void)m;",
             *statements(graph, first, symbols, {}),
+            *self._declared(self.model.initial_blocks),
+            *(
+                [f"  for (int k = {STEPS}; k >= 0; k--) {{", f"  y0[{self.initial_size}] = k / {STEPS}.0;"]
+                if self.homotopy
+                else []
+            ),
             *self._calls(self.model.initial_blocks, "initial_block_", "y0"),
+            *(["  }"] if self.homotopy else []),
             "  return 0;",
             "}",
             "",
         ]
         return lines
+
+    def _path(self) -> list[str]:
+        """The head of the loop from the simplified to the actual initial system."""
+        if not self.homotopy:
+            return []
+        return [f"  for (int k = {STEPS}; k >= 0; k--) {{", f"  y0[{self.initial_size}] = k / {STEPS}.0;"]
 
     def _rates(self, graph: Graph, symbols: dict[str, str]) -> list[str]:
         model, n = self.model, self.size

@@ -12,6 +12,7 @@ from thsa_cosim.export.structure import Incidence, blocks, match, reduce_index
 
 LARGEST_SYMBOLIC = 3
 STABILIZATION = 10.0  # 1/s
+HOMOTOPY = "homotopy()"  # name of the symbol that goes from 1 (simplified) to 0 (actual)
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,9 @@ class EquationSystem:
     ) -> None:
         self.time = time
         self.inputs = inputs
-        self.parameter = parameter or (lambda name: None)  # value of a parameter by name; None for what is none
+        self.parameter = parameter or (
+            lambda name: None
+        )  # value of a parameter by name; None for what is none
         self.names: list[str] = []
         self.symbols: dict[str, ca.SX] = {}
         self.residuals: list[ca.SX] = []
@@ -44,6 +47,7 @@ class EquationSystem:
         self._preference: dict[str, tuple[int, ...]] = {}
         self._derivatives: dict[str, str] = {}
         self.blocks: tuple[Block, ...] = ()
+        self.simplified: dict[int, ca.SX] = {}  # residuals with homotopy, by equation; their path is HOMOTOPY
         self._full: tuple[list[ca.SX], list[str]] = ([], [])
 
     def add_variable(self, name: str, symbol: ca.SX, preference: tuple[int, ...] = (-1,)) -> int:
@@ -231,8 +235,16 @@ class EquationSystem:
                 f"{model}: nothing determines the initial value of {missing[0]}; give it a start value with fixed=true."
             )
         used = labels[len(full_labels) :]
+        for row, residual in self.simplified.items():
+            residuals[row] = residual
+            rows[row] = rows[row] | self.incidence(residual)
         solver = _Solver(self, rows, residuals, labels, model, guesses)
-        return solver.solve(matching), used, tuple(solver.blocks)
+        solution = solver.solve(matching)
+        if self.simplified:
+            path = [s for r in self.simplified.values() for s in ca.symvar(r) if str(s) == HOMOTOPY][:1]
+            final = ca.substitute(list(solution.values()), path, [ca.SX(0)] * len(path))
+            solution = dict(zip(solution, final, strict=True))
+        return solution, used, tuple(solver.blocks)
 
     def _match_rows(self, rows: Incidence) -> dict[int, int]:
         return match(rows, range(len(self.names)))
@@ -331,10 +343,10 @@ class _Solver:
     def _singular(self, matrix: ca.SX) -> bool:
         """Whether a matrix of numbers and parameters has no inverse; False where it depends on anything else."""
         symbols = ca.symvar(matrix)
-        values = [self.system.parameter(str(symbol)) for symbol in symbols]
-        if any(value is None for value in values):
+        values = [v for v in (self.system.parameter(str(symbol)) for symbol in symbols) if v is not None]
+        if len(values) < len(symbols):
             return False
-        numbers = np.array(ca.evalf(ca.substitute([matrix], symbols, [ca.SX(v) for v in values])[0]))
+        numbers = np.array(ca.evalf(ca.substitute(matrix, ca.vertcat(*symbols), ca.vertcat(*values))))
         return not np.isfinite(numbers).all() or bool(np.linalg.matrix_rank(numbers) < len(numbers))
 
     def _reduced(self, residual: ca.SX, names: list[str], linear: bool) -> None:

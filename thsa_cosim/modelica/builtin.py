@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ from thsa_cosim.errors import ModelicaError, did_you_mean
 from thsa_cosim.modelica import arrays
 from thsa_cosim.modelica.arrays import Partial, Record, Value, each, elements, fill, promote, shape, total
 from thsa_cosim.modelica.syntax import Syntax
-from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, make, plain, text, walk
+from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, make, plain, text
 
 if TYPE_CHECKING:
     from thsa_cosim.modelica.evaluate import Evaluator
@@ -247,18 +246,9 @@ def _smooth(evaluator: Evaluator, expression: Syntax) -> Value:
 
 def _homotopy(evaluator: Evaluator, expression: Syntax) -> Value:
     _, arguments, named = expression.args
-    value = evaluator.value(named["actual"] if "actual" in named else arguments[0])
-    branches = any(term.op in ("if", "min", "max") for term in walk(elements(value)))
-    known = evaluator.scope.world.warned
-    place = evaluator.scope.place(expression.line)
-    if branches and place not in known:
-        known.add(place)
-        warnings.warn(
-            f"{place}: homotopy() is taken as its actual value, also while the initial values are found; where these "
-            "have several solutions, another one than with the simplified value may be found.",
-            stacklevel=2,
-        )
-    return value
+    actual = evaluator.value(named["actual"] if "actual" in named else arguments[0])
+    simplified = evaluator.value(named["simplified"] if "simplified" in named else arguments[-1])
+    return each(lambda a, b: Term("homotopy", (a, b)) if isinstance(a, Term) else a, actual, simplified)
 
 
 def _initial(evaluator: Evaluator, expression: Syntax) -> Value:

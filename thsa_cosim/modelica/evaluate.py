@@ -177,7 +177,9 @@ class Evaluator:
 
     def folded(self, condition: Scalar, expression: Syntax) -> Scalar:
         """A condition on parameters alone by their values, if the translation fixes what shapes the equations."""
-        if not (self.scope.world.folded and isinstance(condition, Term) and self.parameters_only([condition])):
+        if not (
+            self.scope.world.folded and isinstance(condition, Term) and self.parameters_only([condition])
+        ):
             return condition
         variables = self.scope.world.variables
         if any("fixed" in variables[n].attributes for n in names(condition)):

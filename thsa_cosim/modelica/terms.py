@@ -23,8 +23,8 @@ class Term:
     """An operation on values; ``op`` is one of
 
     ``ref`` (a variable's name), ``der``, ``pre`` (a term), ``+ - * / ^ neg``, ``< <= > >= == <>``, ``and or not``,
-    ``if`` (condition, value, otherwise), ``noEvent``, ``smooth`` (order, value), ``initial``, ``sample``
-    (start, interval), ``edge``, ``change`` or the name of a built-in function.
+    ``if`` (condition, value, otherwise), ``noEvent``, ``smooth`` (order, value), ``homotopy`` (actual, simplified),
+    ``initial``, ``sample`` (start, interval), ``edge``, ``change`` or the name of a built-in function.
     """
 
     __slots__ = ("args", "op")

@@ -12,7 +12,7 @@ _BOOLEAN = frozenset(
 _LOGICAL = frozenset(("and", "or", "not", "edge"))
 _NUMERIC = frozenset(("+", "-", "*", "/", "^", "neg", "<", "<=", ">", ">=", "der", "sqrt", "exp", "log", "sin", "cos",
                       "tan", "abs", "sign", "min", "max"))  # fmt: skip
-_THROUGH = frozenset(("pre", "noEvent", "start", "smooth"))
+_THROUGH = frozenset(("pre", "noEvent", "start", "smooth", "homotopy"))
 
 
 def check_types(flat: FlatModel) -> None:

@@ -95,7 +95,7 @@ int newton_solve(int n, double *y, Residual residual, const Point *at, double *w
             if (good) {
                 again(n, matrix, pivot, next);
                 good = all_numbers(n, next);
-                correction = size_of(n, next, y);
+                correction = size_of(n, next, from); /* in the units of the step, or the two cannot be compared */
             }
             if (good && (correction <= (1.0 - 0.25 * lambda) * length || correction < 1e-13)) {
                 if (lambda == 1.0 && correction < 1e-10) { /* the simplified correction is exact enough to be taken */

@@ -421,7 +421,8 @@ class _Builder:
         """Event indicators at the start values, from which the search for the initial values sets out."""
         modes = {str(mode) for mode in self.translator.modes}
         if modes and self.system.simplified:  # they follow from where the simplified initial system leads to
-            known = [self.system.symbols[n] for n in initial.solution]
+            symbols = {**self.symbols, **self.system.symbols}
+            known = [symbols[n] for n in initial.solution]
             raw = column(self.translator.indicators)
             return ca.substitute([raw], known, list(initial.solution.values()))[0]
         if not initial.blocks and not {str(s) for s in ca.symvar(initial.x)} & modes:

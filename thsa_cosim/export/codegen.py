@@ -257,7 +257,7 @@ _ARGUMENTS = {
     "first_indicators": _POINT.replace("const double *x, ", "") + ", const double *x_start, double *g",
     "reinit": f"{_POINT}, double *x_new",
     "assertions": f"{_POINT}, double *a",
-    "samples": "const double *p, const double *d, double *s",
+    "samples": "const double *p, const double *d, const double *m, double *s",
     "directional": f"{_POINT}, const double *sx, const double *su, const double *sp, double *ddx, double *dw",
 }
 

@@ -218,7 +218,7 @@ class Translator:
                 raise ModelicaError(f"{name} depends on itself.")
             self._pending.add(name)
             try:
-                return self.real(self.inline[name], events)
+                return self.real(self.inline[name])  # the equation of a variable is outside of any noEvent()
             finally:
                 self._pending.discard(name)
         if name not in self.symbols:

@@ -29,7 +29,7 @@ _REFUSED = frozenset(
     re.findall(
         r"\w+",
         """
-    delay spatialDistribution inStream actualStream terminal hold previous Clock subSample superSample
+    delay spatialDistribution inStream actualStream hold previous Clock subSample superSample
     shiftSample backSample noClock interval firstTick activeState initialState transition ticksInState
     timeInState
         """,
@@ -255,6 +255,11 @@ def _initial(evaluator: Evaluator, expression: Syntax) -> Value:
     return Term("initial", ())
 
 
+def _terminal(evaluator: Evaluator, expression: Syntax) -> Value:
+    evaluator.warn(expression, "terminal() is taken as false: an FMU does not know when its simulation ends.")
+    return False
+
+
 def _sample(evaluator: Evaluator, expression: Syntax) -> Value:
     if len(expression.args[1]) != 2:
         raise evaluator.error(expression, "sample() of a clock is a limit of this exporter.")
@@ -345,6 +350,7 @@ _TABLE: dict[str, Callable[[Any, Syntax], Value]] = {
     "smooth": _smooth,
     "homotopy": _homotopy,
     "initial": _initial,
+    "terminal": _terminal,
     "sample": _sample,
     "semiLinear": _semi_linear,
     "Integer": _to_integer,

@@ -126,6 +126,8 @@ class Collector:
 
     def _connect(self, equation: Equation, evaluator: Evaluator, place: str) -> None:
         nodes, inside = [], []
+        evaluator = evaluator.with_local({})
+        evaluator.connecting = True
         for side in equation.args:
             if side.op != "name":
                 raise ModelicaError(f"{place}: connect() takes the names of two connectors.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -52,6 +53,7 @@ class Evaluator:
         self.scope = scope
         self.local: dict[str, Value] = dict(local or {})
         self.in_function = in_function
+        self.connecting = False  # names are those of connectors
         self.ends: list[int] = []
 
     def with_local(self, local: Mapping[str, Value]) -> Evaluator:
@@ -61,6 +63,13 @@ class Evaluator:
     def error(self, expression: Syntax, what: str) -> ModelicaError:
         """The error with file and line of an expression."""
         return ModelicaError(f"{self.scope.place(expression.line)}: {what}")
+
+    def warn(self, expression: Syntax, what: str) -> None:
+        """Warn of something at an expression, once."""
+        message = f"{self.scope.place(expression.line)}: {what}"
+        if message not in self.scope.world.warned:
+            self.scope.world.warned.add(message)
+            warnings.warn(message, stacklevel=2)
 
     def value(self, expression: Syntax) -> Value:
         """Value of an expression; raises ModelicaError, with file and line, for what is not supported."""
@@ -422,6 +431,8 @@ class Evaluator:
     def _element(self, value: list[Any], index: Scalar, where: Syntax) -> Any:
         if isinstance(index, bool):
             index = int(index) + 1
+        if isinstance(index, Term) and (self.connecting or isinstance(value[0] if value else None, Scope)):
+            index = self.fixed(index, where, f"a subscript of {_written(where)}")  # which component it is
         index = plain(index)
         if isinstance(index, Term):
             return self._variable_index(value, index, where)

@@ -10,8 +10,9 @@ _BOOLEAN = frozenset(
     ("and", "or", "not", "<", "<=", ">", ">=", "==", "<>", "edge", "change", "initial", "sample")
 )
 _LOGICAL = frozenset(("and", "or", "not", "edge"))
-_NUMERIC = frozenset(("+", "-", "*", "/", "^", "neg", "<", "<=", ">", ">=", "der", "sqrt", "exp", "log", "sin", "cos",
-                      "tan", "abs", "sign", "min", "max"))  # fmt: skip
+_ALIKE = frozenset(("<", "<=", ">", ">=", "==", "<>", "min", "max"))  # false < true
+_NUMERIC = frozenset(("+", "-", "*", "/", "^", "neg", "der", "sqrt", "exp", "log", "sin", "cos",
+                      "tan", "abs", "sign"))  # fmt: skip
 _THROUGH = frozenset(("pre", "noEvent", "start", "smooth", "homotopy"))
 
 
@@ -63,6 +64,12 @@ class _Checker:
             self._all(args, False, term, place)
         elif op in _LOGICAL:
             self._all(args, True, term, place)
+        elif op in _ALIKE:
+            kinds = {self.boolean(a) for a in args}
+            if {True, False} <= kinds:
+                raise ModelicaError(f"{place}: {text(term)} compares a Boolean with a number.")
+            if op in ("min", "max"):
+                return True if True in kinds else False if False in kinds else None
         elif op == "if":
             self._all(args[:1], True, term, place)
             kinds = {self.boolean(args[1]), self.boolean(args[2])}

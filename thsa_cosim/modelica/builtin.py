@@ -294,6 +294,13 @@ def _cardinality(evaluator: Evaluator, expression: Syntax) -> Value:
 
 def record_operator(evaluator: Evaluator, op: str, a: Value, b: Value, expression: Syntax) -> Value:
     """Operators of records: those of Complex."""
+    for value in (a, b):
+        kind_of = evaluator.scope.find_class(value.type) if isinstance(value, Record) else None
+        if kind_of is not None and kind_of.definition.name != "Complex":
+            raise evaluator.error(
+                expression,
+                f"the operator {op} on the record {kind_of.qualified} is a limit of this exporter.",
+            )
     if op in ("+", "-", ".+", ".-") and isinstance(a, Record) and isinstance(b, Record):
         return each(lambda x, y: make(op.lstrip("."), x, y), a, b)
     values = [v if isinstance(v, Record) else Record("Complex", {"re": v, "im": 0.0}) for v in (a, b)]

@@ -88,6 +88,7 @@ class CausalModel:
     g_start: ca.SX = field(
         default_factory=lambda: ca.SX(0, 1)
     )  # g at the guesses, where the initial values need modes
+    g_simplified: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # where homotopy() leads to
     assertions: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     domain: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # nonzero where a function leaves its domain
     domain_texts: tuple[str, ...] = ()
@@ -305,6 +306,7 @@ class _Builder:
             outputs=outputs,
             g=indicators,
             g_start=self._first_indicators(indicators, x, initial),
+            g_simplified=self._simplified_indicators(initial),
             dependent=dependent,
             initial=initial.x,
             events=self._events(final, x, states, reinits, initial),
@@ -407,6 +409,12 @@ class _Builder:
             fresh[k] = ca.if_else(condition, value, fresh[k])
         starts = [initial.free.get(n, self._z_start(n)) for n in memory.names]
         samples = [ca.horzcat(start, interval) for start, interval, _ in memory.samples]
+        for times in samples:
+            if any(str(s) in memory.symbols() for s in ca.symvar(times)):
+                raise ModelicaError(
+                    f"{self.flat.name}: a sample() whose times the initial equations determine (as from the start of "
+                    "the simulation) is a limit of this exporter."
+                )
         return Events(
             z=tuple(memory.names),
             left=len(memory.left),
@@ -420,17 +428,24 @@ class _Builder:
     def _first_indicators(self, indicators: ca.SX, x: ca.SX, initial: "_Initial") -> ca.SX:
         """Event indicators at the start values, from which the search for the initial values sets out."""
         modes = {str(mode) for mode in self.translator.modes}
-        if modes and self.system.simplified:  # they follow from where the simplified initial system leads to
-            symbols = {**self.symbols, **self.system.symbols}
-            known = [symbols[n] for n in initial.solution]
-            raw = column(self.translator.indicators)
-            return ca.substitute([raw], known, list(initial.solution.values()))[0]
-        if not initial.blocks and not {str(s) for s in ca.symvar(initial.x)} & modes:
+        if (
+            not initial.blocks
+            and not self.system.simplified
+            and not {str(s) for s in ca.symvar(initial.x)} & modes
+        ):
             return ca.SX(0, 1)
         unknown = [b.unknown.nz[i] for b in self.system.blocks for i in range(b.unknown.numel())]
         guesses = [initial.guesses.get(n, ca.SX(0)) for b in self.system.blocks for n in b.names]
         moved = ca.substitute([indicators], [x, column(unknown)], [initial.x_start, column(guesses)])[0]
         return moved
+
+    def _simplified_indicators(self, initial: "_Initial") -> ca.SX:
+        """Event indicators where the way from the simplified initial system ends."""
+        if not self.system.simplified:
+            return ca.SX(0, 1)
+        symbols = {**self.symbols, **self.system.symbols}
+        known = [symbols[n] for n in initial.solution]
+        return ca.substitute([column(self.translator.indicators)], known, list(initial.solution.values()))[0]
 
     def _z_start(self, name: str) -> ca.SX:
         if name in self.split.starts:

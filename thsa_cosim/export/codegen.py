@@ -163,7 +163,7 @@ def model_source(model: CausalModel) -> ModelSource:
         begin = implicit.begin(name)
         parts += _function(graph, name, listed, symbols, cached, bool(slow.inputs), before=begin)
     for name, listed in alone.items():
-        after = _after_dependent(slow, name)
+        after = _after_dependent(slow, name) + implicit.end(graph, name, symbols)
         begin = implicit.begin(name)
         parts += _function(graph, name, listed, symbols, {}, False, after=after, before=begin)
     parts.append(_tables(model))
@@ -257,7 +257,7 @@ _ARGUMENTS = {
     "first_indicators": _POINT.replace("const double *x, ", "") + ", const double *x_start, double *g",
     "reinit": f"{_POINT}, double *x_new",
     "assertions": f"{_POINT}, double *a",
-    "samples": "const double *p, const double *d, const double *m, double *s",
+    "samples": "const double *p, const double *d, double *s",
     "directional": f"{_POINT}, const double *sx, const double *su, const double *sp, double *ddx, double *dw",
 }
 

@@ -72,16 +72,16 @@ class Implicit:
 
     def begin(self, name: str) -> list[str]:
         """The first statements of a function: bring y, and its derivatives, up to date."""
-        if name in ("dependent", "samples") or (name == "first_indicators" and not self.homotopy):
+        if name in ("dependent", "samples", "first_indicators"):
             return []
-        if name in ("initial", "discrete_start", "first_indicators"):
+        if name in ("initial", "discrete_start"):
             lines = []
             if self.initial_size:
                 lines = [
                     f"  double y0[{self.initial_size + self.homotopy}];",
                     "  if (solve_initial(t, u, p, d, m, x_start, y0)) return 1;",
                 ]
-            if self.size and name != "first_indicators":
+            if self.size:
                 lines.append("  double *v = implicit_of(d);")
                 if name == "discrete_start":
                     lines.append("  if (solve(t, x, u, p, d, m)) return 1;")
@@ -210,6 +210,22 @@ class Implicit:
             "",
         ]
         return lines
+
+    def end(self, graph: Graph, name: str, symbols: dict[str, str]) -> list[str]:
+        """The last statements of a function: relations at the end of the way from the simplified initial system."""
+        if name != "first_indicators" or not self.homotopy:
+            return []
+        found = [(f"g[{i}]", node) for i, node in enumerate(graph.add_column(self.model.g_simplified))]
+        return [
+            f"  double settled[N_M + 1], y0[{self.initial_size + 1}];",
+            "  for (int k = 0; k < N_M; k++) settled[k] = k < N_G ? (double)(g[k] > 0.0) : m[k];",
+            "  if (solve_initial(t, u, p, d, settled, x_start, y0)) return 0;",
+            "  {",
+            "  const double *m = settled;",
+            "  (void)m;",
+            *statements(graph, found, symbols, {}),
+            "  }",
+        ]
 
     def _path(self) -> list[str]:
         """The head of the loop from the simplified to the actual initial system."""

@@ -111,7 +111,7 @@ static int tick(Instance *c) {
     int due = 0;
     if (!N_T) return 0;
     double table[2 * N_T + 2];
-    model_samples(s->p, s->d, s->now.m, table);
+    model_samples(s->p, s->d, table);
     for (int k = 0; k < N_T; k++) {
         const double start = table[2 * k], interval = table[2 * k + 1];
         if (s->now.next[k] > s->now.time + grain(s->now.time)) continue;
@@ -128,7 +128,7 @@ static void first_ticks(Instance *c) {
     State *s = &c->s;
     if (!N_T) return;
     double table[2 * N_T + 2];
-    model_samples(s->p, s->d, s->now.m, table);
+    model_samples(s->p, s->d, table);
     for (int k = 0; k < N_T; k++) {
         const double start = table[2 * k], interval = table[2 * k + 1], behind = s->now.time - start;
         s->now.next[k] = start;

@@ -53,13 +53,12 @@ class Machine:
         Of two that fit, that of the slower shaft: its few low orders are the likelier.
         """
         shafts = sorted(self.turns.get(slot, {}).items(), key=lambda item: item[1])
-        reach = self.travel.get(slot, 0.0)
         for shaft, ratio in shafts:
             number = round(wave / ratio)
             apart = abs(wave - number * ratio)
             # As near as the travel can tell, and six standard errors do not reach half the way to the next order;
             # a wave that is only as near as its error has to be sharper, or any would be near.
-            close = apart * 0.5 * reach < PHASE and max(stderr, 0.0) < ratio / 12.0
+            close = apart * 0.5 * self.travel[slot] < PHASE and max(stderr, 0.0) < ratio / 12.0
             near = apart < 3.0 * stderr and max(stderr, 0.0) < 0.05 * ratio
             if 1 <= number <= (FAST if shaft == "motor" else SLOW) and (close or near):
                 return Order(shaft, number)

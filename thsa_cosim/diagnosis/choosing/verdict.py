@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from thsa_cosim.diagnosis.fitting.structure import errors, worst_share
 from thsa_cosim.diagnosis.fitting.trials import Trial
-from thsa_cosim.diagnosis.results import ChannelError, Verdict
+from thsa_cosim.diagnosis.results import StructuredError, Verdict
 from thsa_cosim.signals import FloatArray
 
 #: Structure (rms in standard deviations of the noise, in some signal) and its significance that count as visible in a
@@ -15,7 +15,7 @@ VISIBLE, SIGNIFICANT = 0.15, 6.0
 VISIBLE_BESIDE = 0.46
 
 
-def verdict_on(errors_after: Mapping[str, ChannelError], accepted: int, tested: int) -> Verdict:
+def verdict_on(errors_after: Mapping[str, StructuredError], accepted: int, tested: int) -> Verdict:
     """The verdict on held-out ``errors_after`` with ``accepted`` effects out of ``tested`` candidates.
 
     In standard deviations, not in shares: a hundredth of a large residual may still be a fault that anybody sees.
@@ -27,7 +27,7 @@ def verdict_on(errors_after: Mapping[str, ChannelError], accepted: int, tested: 
     return "no-missing-effect" if tested else "not-tested"
 
 
-def is_visible(found: Mapping[str, ChannelError], size: float) -> bool:
+def is_visible(found: Mapping[str, StructuredError], size: float) -> bool:
     """Whether some signal holds structure that is neither chance nor smaller than ``size`` (in its noise)."""
     return any(e.structure > size * e.noise and e.significance > SIGNIFICANT for e in found.values())
 

@@ -201,6 +201,7 @@ def test_laws_are_those_of_the_catalogue() -> None:
     for (effect, _), law in laws(None).items():
         if effect in ("stribeck", "windage", "load-dependent-friction", "shear-thinning"):
             p = {"dF": 1.0, "v_S": 0.1, "n": 2.0, "b_q": 1.0, "mu": 0.1, "mu_S": 0.1, "mu_2": 0.1, "v_0": 0.1}
+            p |= {"n_S": 1.0, "mu_v": 0.1, "mu_D": 0.05, "mu_A": 0.04}
             assert np.all(law(p, at) * at["v"] >= 0.0)
 
 

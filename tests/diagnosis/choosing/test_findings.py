@@ -48,7 +48,7 @@ def proposal(
         name=f"{effect}:{place}",
         key=f"{effect}:{place}/x0",
         component=effect,
-        slot=SimpleNamespace(name=place),
+        slot=SimpleNamespace(name=place, interface="FrictionEffect"),
         parameters=(own,),
         coefficients=(own,),
     )

@@ -10,8 +10,8 @@ from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
 from thsa_cosim.diagnosis.results import StructuredError
 
 
-def error(noise: float, structure: float, significance: float) -> StructuredError:
-    return StructuredError(9.0, 0.5, noise, "A", 1000, structure, significance)
+def error(noise: float, structure: float, significance: float, rmse: float = 3.0) -> StructuredError:
+    return StructuredError(rmse, 0.5, noise, "A", 1000, structure, significance)
 
 
 NOTHING = error(1.0, 0.05, 2.0)
@@ -37,6 +37,12 @@ def test_verdict(name: str):
     shown = error(2.0, 2.0 * structure, significance)
     assert verdict_on({"v": NOTHING, "i": shown}, accepted, tested) == expected
     assert verdict_on({"i": shown, "v": NOTHING}, accepted, tested) == expected
+
+
+def test_a_gross_error_is_no_noise_even_where_few_samples_make_it():
+    gross = error(2.0, 6.0, 1.5, rmse=6.1)
+    assert verdict_on({"v": NOTHING, "i": gross}, 0, 40) == "unexplained-structure"
+    assert verdict_on({"v": NOTHING, "i": gross}, 1, 40) == "missing-effect"
 
 
 def test_the_share_that_is_left_is_that_of_the_worst_signal_that_shows_anything():

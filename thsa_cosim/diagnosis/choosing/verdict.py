@@ -13,6 +13,8 @@ VISIBLE, SIGNIFICANT = 0.15, 6.0
 #: ... and in one with effects, whose form and contact with the solver's steps are never quite those of the machine:
 #: an error of 1.1 times the noise.
 VISIBLE_BESIDE = 0.46
+#: Without an effect, a held-out error of so many times the noise is no noise, however few samples make it.
+GROSS = 3.0
 
 
 def verdict_on(errors_after: Mapping[str, StructuredError], accepted: int, tested: int) -> Verdict:
@@ -20,7 +22,8 @@ def verdict_on(errors_after: Mapping[str, StructuredError], accepted: int, teste
 
     In standard deviations, not in shares: a hundredth of a large residual may still be a fault that anybody sees.
     """
-    if is_visible(errors_after, VISIBLE_BESIDE if accepted else VISIBLE):
+    gross = not accepted and any(e.rmse > GROSS * e.noise for e in errors_after.values())
+    if gross or is_visible(errors_after, VISIBLE_BESIDE if accepted else VISIBLE):
         return "unexplained-structure" if tested else "not-tested"
     if accepted:
         return "missing-effect"

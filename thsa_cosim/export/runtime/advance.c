@@ -186,6 +186,17 @@ static void commit(Instance *c, double time, const double *g_end, double from, c
     instance_changed(c);
 }
 
+/* The event iteration, and whether it changes anything. */
+static Status update_modes(Instance *c, int *changed) {
+    const Motion *now = &c->s.now;
+    double m[N_M + 1], x[N_X];
+    memcpy(m, now->m, sizeof m);
+    memcpy(x, now->x, sizeof x);
+    const Status status = instance_update_modes(c);
+    *changed = memcmp(m, now->m, sizeof m) != 0 || memcmp(x, now->x, sizeof x) != 0;
+    return status;
+}
+
 Status solver_advance(Instance *c, double end) {
     Motion *now = &c->s.now;
     const double whole = c->recorder ? trajectory_spacing(c) : end - now->time;
@@ -263,10 +274,9 @@ Status solver_advance(Instance *c, double end) {
             start = finish;
             continue;
         }
-        const long events = c->events;
-        if (instance_update_modes(c) != OK) return DISCARD;
-        if (c->events != events || landing) { /* a landing without a change: g is rounding noise there */
-            restarted = c->events != events;
+        if (update_modes(c, &restarted) != OK) return DISCARD;
+        if (!restarted && !landing) rapid = MOST_RAPID - 4; /* a blind step without an event: the burst may be over */
+        if (restarted || landing) { /* a landing without a change: g may be rounding noise there */
             if (now->time - last_event > fmax(1e-6 * now->step, 4.0 * blind)) rapid = 0, blind = 0.0;
             last_event = now->time;
             if (++rapid == MOST_RAPID)

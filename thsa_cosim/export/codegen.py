@@ -188,7 +188,7 @@ def _symbols(name: str, size: int) -> ca.SX:
 
 
 def time_slopes(model: CausalModel) -> list[ca.SX]:
-    """dg/dt of every relation that is linear in time and else depends on what is constant between events; 0 of others."""
+    """dg/dt of each relation that is linear in time and depends on nothing else that varies between events; else 0."""
     held = _parameters(model) | {model.m.nz[i].name() for i in range(model.m.numel())}
     slopes = []
     for k in range(model.g.numel()):

@@ -55,7 +55,7 @@ class Fit:
     @property
     def folded(self) -> "Fit":
         """The same with R (n, n) in place of the Jacobian, RᵀR = JᵀJ: what covariances need, without a row a sample."""
-        return replace(self, jacobian=np.linalg.qr(self.jacobian, mode="r"))
+        return replace(self, jacobian=np.asarray(np.linalg.qr(self.jacobian, mode="r")))
 
     @property
     def inflation(self) -> float:

@@ -32,6 +32,10 @@ def scenario(folder: Path, loop: str = LOOP) -> Path:
     text = text.replace("../fmus", str(ROOT / "fmus"))
     text = text.replace('[[requirements]]\nmetric = "overshoot"', loop, 1)
     text = text.replace("population = 16\ngenerations = 10", "population = 5\ngenerations = 1")
+    text = text.replace(
+        "lower = 0.03\nupper = 3.0", "lower = 0.62\nupper = 0.7"
+    )  # near gains that hold every limit
+    text = text.replace("lower = 0.1\nupper = 30.0", "lower = 2.8\nupper = 3.0")
     path = folder / "sampled.toml"
     path.write_text(text)
     return path
@@ -71,3 +75,4 @@ def test_delay_costs_margin_and_gains_that_fall_below_the_limit_are_marked(tmp_p
     assert continuous["phase_margin"] == pytest.approx(69.2, abs=0.3)
     assert result["before"]["phase_margin"] == pytest.approx(80.8, abs=0.3)
     assert not continuous["feasible"]
+    assert result["after"]["phase_margin"] > 75.0

@@ -10,7 +10,6 @@ import pytest
 from thsa_cosim.diagnosis.choosing.attribution import Round
 from thsa_cosim.diagnosis.choosing.chance import probability
 from thsa_cosim.diagnosis.choosing.findings import (
-    between_rivals,
     found_effects,
     judged,
     undetermined,
@@ -26,7 +25,13 @@ GAINS = np.random.default_rng(3).gumbel(5.0, 1.5, 1000)
 
 
 def parameter(variable: str, role: str = "coefficient", **more: Any) -> Any:
-    given = {"unit": "N", "typical": 1.0, "neutral": 0.0, "name": variable.rpartition(".")[2]} | more
+    given = {
+        "unit": "N",
+        "typical": 1.0,
+        "neutral": 0.0,
+        "fixed": False,
+        "name": variable.rpartition(".")[2],
+    } | more
     return SimpleNamespace(variable=variable, role=role, **given)
 
 
@@ -189,17 +194,6 @@ def test_values_are_widened_by_what_is_left_and_split_into_declared_and_effects(
     assert values_of(fit, declared=True)["p"] == Value(1.0, "N", pytest.approx(1.0))
     ended = replace(fit, vector=np.array([9.0, 4.0]))
     assert values_of(ended, declared=True)["p"].reason == "it ended at the end of its range, 9 N"
-
-
-def test_rivals_widen_the_declared_parameters_that_they_bend_and_nothing_else():
-    """0.6 apart with equal chances: the root of the mean square about the named one is 0.6/sqrt(2)."""
-    winner, rival, other = (scored(proposal(name, 90.0)) for name in "abc")
-    rival.fit = replace(rival.fit, vector=np.array([1.6, 9.0]))
-    other.fit = replace(other.fit, vector=np.array([0.4, 7.0]))
-    for rivals, apart in (((rival,), 0.6 / 2**0.5), ((rival, other), 0.6 * (2 / 3) ** 0.5), ((), 0.0)):
-        own = one_round([winner.proposal], [winner], winner, ("",), rivals)
-        found = between_rivals(attribution(own, accepted=(winner,)), winner.fit)
-        np.testing.assert_allclose(found, [apart, 0.0], atol=1e-12)
 
 
 def test_a_value_at_its_bound_unseen_or_only_known_from_the_drawing_is_not_determined():

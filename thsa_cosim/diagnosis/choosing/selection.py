@@ -119,9 +119,10 @@ class Selection:
 
     def refined(self, proposals: Sequence[Proposal], limit: float) -> list[Scored]:
         """What is worth it, fitted with the declared parameters, best on held-out recordings first."""
-        return self._fitted(worth_refining(proposals, limit))
+        return self.fitted(worth_refining(proposals, limit))
 
-    def _fitted(self, proposals: Sequence[Proposal]) -> list[Scored]:
+    def fitted(self, proposals: Sequence[Proposal]) -> list[Scored]:
+        """``proposals`` fitted with the declared parameters, best on held-out recordings first."""
         scored: list[Scored] = []
         solved = 0.0
         for proposal in proposals:
@@ -160,7 +161,7 @@ class Selection:
             before[p.candidate.key] = max(before.get(p.candidate.key, 0.0), p.gain)
         better = worth_refining([p for p in further if p.gain > BETTER * before[p.candidate.key]], limit)
         chosen = sorted([*better, *other_waves(proposals, scored)], key=lambda p: -p.gain)
-        found = sorted([*scored, *self._fitted(chosen)], key=lambda s: -s.held_out_gain)
+        found = sorted([*scored, *self.fitted(chosen)], key=lambda s: -s.held_out_gain)
         return simplest_first(found, self._ties)
 
     def evidence(self, one: Scored) -> Evidence:

@@ -11,7 +11,7 @@ import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Status
 from thsa_cosim.diagnosis.choosing.attribution import Attribution
-from thsa_cosim.diagnosis.choosing.score import Scored
+from thsa_cosim.diagnosis.choosing.score import Scored, fixed_shapes
 from thsa_cosim.diagnosis.explaining.profiles import Profile, input_range, profiles, travel
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.results import SeparatingExperiment
@@ -98,7 +98,7 @@ def _rivals(found: Attribution) -> tuple[tuple[Scored, Scored] | None, FloatArra
 
 
 def _values(scored: Scored, group: str) -> Mapping[str, float]:
-    return scored.fit.unknowns.assignments(scored.fit.vector, group)
+    return {**fixed_shapes([scored]), **scored.fit.unknowns.assignments(scored.fit.vector, group)}
 
 
 def _inputs(recorded: Signals, time: FloatArray, spec: DiagnoseSpec, profile: Profile) -> Signals:

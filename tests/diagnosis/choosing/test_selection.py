@@ -69,7 +69,12 @@ def scored(effect: str, left: float, place: str = "motor") -> Any:
     gain = float(HELD @ HELD - validate @ validate)
     own = proposal(effect, gain, place)
     return SimpleNamespace(
-        proposal=own, candidate=own.candidate, validate=validate, held_out_gain=gain, fit_gain=gain
+        proposal=own,
+        candidate=own.candidate,
+        validate=validate,
+        fit=SimpleNamespace(residual=validate, cost=float(validate @ validate)),
+        held_out_gain=gain,
+        fit_gain=gain,
     )
 
 
@@ -79,8 +84,9 @@ def selection(monkeypatch: pytest.MonkeyPatch) -> Selection:
     monkeypatch.setattr(room, "polish", lambda bench, one, current, held: one)
     monkeypatch.setattr(room, "go_on", lambda bench, one, current, held: one)
     bench: Any = SimpleNamespace(of=lambda part: TRIALS)
-    nothing: Any = None
-    return Selection(bench, nothing, nothing, HELD)
+    weights: Any = None
+    current: Any = SimpleNamespace(residual=HELD)
+    return Selection(bench, weights, current, HELD)
 
 
 def names(found: tuple[Any, ...]) -> list[str]:

@@ -22,8 +22,9 @@ from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
 
-#: Objection to a form in whose place another one fits better.
+#: Objections to what another form, or another effect, takes the place of.
 TAKEN = "another form of it fits better"
+APART = "explains the held-out recordings as well, but not the fit recording that distinguishes them"
 
 Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
 
@@ -189,6 +190,7 @@ def _round(
     forms: tuple[Scored, ...] = ()
     if choice is not None and whole:
         first = choice
+        choice = selection.overtaking(choice, scored) or choice
         choice, forms = best_form(selection, choice, scored, proposals, offered)
         if choice is not first:
             scored, objections = _taken_over(choice, scored, objections)
@@ -205,7 +207,11 @@ def _taken_over(
 ) -> tuple[list[Scored], tuple[str, ...]]:
     """What was refined, and its objections, with a better form in the first place."""
     others = [(s, why) for s, why in zip_longest(scored, objections) if s.proposal is not choice.proposal]
-    whys = (TAKEN if why == "" else why for _, why in others if why is not None)
+    whys = [
+        why or (TAKEN if s.candidate.name == choice.candidate.name else APART)
+        for s, why in others
+        if why is not None
+    ]
     return [choice, *(s for s, _ in others)], ("", *whys)
 
 

@@ -1,11 +1,13 @@
-"""Does one more recording, planned by the diagnosis, leave no tie?  python benchmarks/blind_next.py [--units 30] [--seed 1]
+"""Does one more recording, planned by the diagnosis, leave no tie?
 
-A bench in closed form: a motor with its declared resistance, torque constant, Coulomb and viscous friction, an effect at a
-random place of its range, sensors with white noise. Every unit was recorded too poorly: its speeds lie in a narrow band, its
-load hardly changes. Units whose diagnosis ends with a tie are kept until there are enough. For each the next experiment is
-planned within the rig's limits, "recorded" from the true drive, and fitted in addition, as `thsa-cosim diagnose --next` and
-`--with` do. Printed: ties before and after, whether the first name is the true one, and what was expected of the profile.
-Goal: no tie left in 90 %.
+    python benchmarks/blind_next.py [--units 30] [--seed 1]
+
+A bench in closed form: a motor with its declared resistance, torque constant, Coulomb and viscous friction, an effect
+at a random place of its range, sensors with white noise. Every unit was recorded too poorly: its speeds lie in a
+narrow band, its load hardly changes. Units whose diagnosis ends with a tie are kept until there are enough. For each
+the next experiment is planned within the rig's limits, "recorded" from the true drive, and fitted in addition, as
+`thsa-cosim diagnose --next` and `--with` do. Printed: ties before and after, whether the first name is the true one,
+and what was expected of the profile. Goal: no tie left in 90 %.
 """
 
 from __future__ import annotations

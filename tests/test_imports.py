@@ -5,7 +5,18 @@ import sys
 
 import pytest
 
-SLOW = ("casadi", "matplotlib", "numba", "pandas", "pint", "plotly", "pyarrow", "scipy", "thsa_cosim.export")
+SLOW = (
+    "casadi",
+    "duckdb",
+    "matplotlib",
+    "numba",
+    "pandas",
+    "pint",
+    "plotly",
+    "pyarrow",
+    "scipy",
+    "thsa_cosim.export",
+)
 
 
 @pytest.mark.parametrize(

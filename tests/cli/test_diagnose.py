@@ -11,10 +11,11 @@ import pandas as pd
 import pytest
 
 from thsa_cosim import cli
+from thsa_cosim.api.conduct import ask
 from thsa_cosim.cli.options import StudyOptions
 from thsa_cosim.export import export_fmu
 from thsa_cosim.fmu import Plant
-from thsa_cosim.scenario import load_scenario
+from thsa_cosim.scenario import Scenario, load_scenario
 from thsa_cosim.study import claim_folder, study_identity
 
 ROOT = Path(__file__).parents[2]
@@ -100,6 +101,18 @@ def test_a_finished_folder_does_not_answer_another_question(
     first.write_text(first.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
     assert cli.run_command(["diagnose", str(first), "-o", str(study)]) == 2
     assert says in capsys.readouterr().err
+
+
+def test_the_package_of_the_command_line_takes_the_place_of_the_scenarios(tmp_path: Path):
+    path = scenario(tmp_path, 2000)
+    own, other = ask("diagnose", path).scenario, ask("diagnose", path, package=tmp_path).scenario
+    assert isinstance(own, Scenario)
+    assert isinstance(other, Scenario)
+    assert other.diagnose is not None
+    assert other.diagnose.package == tmp_path
+    assert other.diagnose.model == "THSA.Actuator"
+    changed = {k for k, v in study_identity(other).items() if study_identity(own)[k] != v}
+    assert changed == {"diagnose.package"}
 
 
 @pytest.mark.slow

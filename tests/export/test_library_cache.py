@@ -1,13 +1,15 @@
 """Compiled libraries are kept by their sources: the next export of the same model starts no compiler."""
 
+import ctypes
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from thsa_cosim.errors import ThsaCosimError
+from thsa_cosim.errors import MissingExtraError, ThsaCosimError
 from thsa_cosim.export import compile as compiling
 from thsa_cosim.export.compile import PLATFORMS, compile_library
+from thsa_cosim.fmu.sources import host_compiler
 
 
 @pytest.fixture
@@ -24,7 +26,7 @@ def compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[list[str]]
         return subprocess.CompletedProcess(command, 0, "", "")
 
     monkeypatch.setattr(compiling.subprocess, "run", run)
-    monkeypatch.setattr(compiling, "compiler_version", lambda: "1.0")
+    monkeypatch.setattr(compiling, "ziglang_version", lambda: "1.0")
     monkeypatch.setenv("THSA_COSIM_CACHE", str(tmp_path / "cache"))
     return commands
 
@@ -53,7 +55,7 @@ def test_a_changed_header_platform_or_compiler_is_compiled_anew(
     compile_library(folder, ["model.c"], PLATFORMS[1], tmp_path / "1.dll")
     sources(folder, model_h="int g;")
     compile_library(folder, ["model.c"], PLATFORMS[0], tmp_path / "2.so")
-    monkeypatch.setattr(compiling, "compiler_version", lambda: "1.1")
+    monkeypatch.setattr(compiling, "ziglang_version", lambda: "1.1")
     compile_library(folder, ["model.c"], PLATFORMS[0], tmp_path / "3.so")
     assert len(compiler) == 4
 
@@ -85,3 +87,22 @@ def test_the_oldest_go_first(
         folder = sources(tmp_path / "model", model_c=f"int a{number};")
         compile_library(folder, ["model.c"], PLATFORMS[0], tmp_path / "0.so")
     assert len(list((tmp_path / "cache" / "libraries").iterdir())) == 2
+
+
+def test_without_ziglang_the_machines_compiler_builds_for_this_machine_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if host_compiler() is None:
+        pytest.skip("no C compiler (gcc, cc or clang)")
+    monkeypatch.setattr(compiling, "ziglang_version", lambda: None)
+    monkeypatch.setenv("THSA_COSIM_CACHE", "")
+    folder = sources(
+        tmp_path / "model", model_c='__attribute__((visibility("default"))) int seven(void){return 7;}'
+    )
+    (own,) = compiling.available_platforms()
+    library = tmp_path / f"model{own.suffix}"
+    compile_library(folder, ["model.c"], own, library)
+    assert ctypes.CDLL(str(library)).seven() == 7
+    other = next(platform for platform in PLATFORMS if platform != own)
+    with pytest.raises(MissingExtraError, match=rf"for {other.fmi3} needs an optional part.*\[export\]"):
+        compile_library(folder, ["model.c"], other, library)

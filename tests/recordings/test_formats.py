@@ -11,6 +11,7 @@ from scipy.io import savemat
 
 from thsa_cosim.errors import MissingExtraError, RecordingError, UnitError
 from thsa_cosim.recordings import Column, TimeAxis, column_names, read_recording
+from thsa_cosim.recordings import parquet as parquet_reader
 
 SHARED = Path(__file__).parents[3] / "shared" / "recordings" / "table4"
 TIME = np.arange(200) * 0.01
@@ -75,6 +76,57 @@ def test_parquet_time_stamps_integers_decimals_and_nulls(tmp_path):
     assert count.signals["n"].tolist() == list(range(200))
     with pytest.raises(RecordingError, match=r"'gap' is nan at 0\.07 s \(sample 8, 1 in all\)"):
         read_recording(tmp_path / "run.parquet", {"n": Column("gap")}, time=TimeAxis("time"))
+
+
+def parquet(path, **columns):
+    pq.write_table(pa.table({name: pa.array(values) for name, values in columns.items()}), path)
+    return path
+
+
+def test_parquet_columns_are_told_apart_by_case_and_files_by_their_literal_names(tmp_path):
+    folder = tmp_path / "T=-30"
+    folder.mkdir()
+    parquet(folder / "run1.parquet", time=TIME, v=CURRENT, V=CURRENT)
+    file = parquet(folder / "run[1].parquet", time=TIME, v=SPEED, V=CURRENT)
+    found = read_recording(file, {"v": Column("v"), "V": Column("V")}, time=TimeAxis("time", "s"))
+    assert found.signals["v"].tolist() == SPEED.tolist()
+    assert found.signals["V"].tolist() == CURRENT.tolist()
+    assert column_names(file) == ("time", "v", "V")
+
+
+def test_parquet_durations_zones_dates_and_booleans(tmp_path):
+    ms = (TIME * 1e3).round().astype(int)
+    instants = [None if k == 3 else int(t) for k, t in enumerate(ms)]
+    file = parquet(
+        tmp_path / "run.parquet",
+        duration=pa.array(ms, pa.duration("ms")),
+        zoned=pa.array(instants, pa.timestamp("ms", tz="Europe/Berlin")),
+        day=pa.array(np.arange(200), pa.int32()).cast(pa.date32()),
+        flag=pa.array([None if k == 5 else k % 2 == 0 for k in range(200)]),
+        time_of_day=pa.array(ms, pa.int32()).cast(pa.time32("ms")),
+        note=pa.array(["x"] * 200).dictionary_encode(),
+        pair=pa.array([[1.0, 2.0]] * 200),
+    )
+    read = parquet_reader.read(file, lambda names: names)
+    assert read["duration"].values == pytest.approx(TIME, abs=1e-12)
+    assert read["duration"].unit == read["zoned"].unit == "s"
+    assert np.isnan(read["zoned"].values[3])
+    assert np.delete(read["zoned"].values, 3) == pytest.approx(np.delete(TIME, 3), abs=1e-12)
+    assert read["day"].values[-1] == 199 * 86400.0
+    assert np.isnan(read["flag"].values[5])
+    assert read["flag"].values[[0, 1]].tolist() == [1.0, 0.0]
+    for name in ("time_of_day", "note", "pair"):
+        assert read[name].problem.startswith("is not numeric but ")
+
+
+def test_parquet_whose_arrow_schema_is_damaged_is_refused(tmp_path):
+    """Without it a duration would be a number of unknown unit."""
+    file = parquet(tmp_path / "run.parquet", time=pa.array([1, 2, 3], pa.duration("ms")), v=[1.0, 2.0, 3.0])
+    content = file.read_bytes()
+    at = content.index(b"ARROW:schema") + 40
+    file.write_bytes(content[:at] + b"\x01\x02" + content[at + 2 :])
+    with pytest.raises(RecordingError, match=r"no readable parquet file \(its Arrow schema cannot be read"):
+        read_recording(file, {"v": Column("v")}, time=TimeAxis("time", "s"))
 
 
 def matlab_content():

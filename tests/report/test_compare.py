@@ -80,6 +80,36 @@ def test_what_the_data_do_not_determine_has_no_z(folder: Path) -> None:
     assert any("T_fm" in note for note in found.notes)
 
 
+def test_what_rises_from_nothing_is_a_difference(folder: Path, tmp_path: Path) -> None:
+    """A stiffness that cannot be distinguished from zero in one study, and is 1.82 in the other."""
+    for name, value, why in (("bare", -1e-3, "it cannot be distinguished from zero"), ("spring", 1.82, "")):
+        shutil.copytree(folder / "first", tmp_path / name)
+        own = {"value": value, "stderr": 2e-3, "unit": "N.m/rad", "identifiable": not why, "reason": why}
+
+        def add(result: dict[str, Any], own: dict[str, Any] = own) -> None:
+            result["points"][1]["parameters"]["c"] = own
+
+        edit(tmp_path / name / "result.json", add)
+    sentence = compare([tmp_path / "bare", tmp_path / "spring"]).sentence()
+    assert sentence.startswith("c rose from -0.0010 ± 0.0020 to 1.8200 ± 0.0020 N.m/rad; no other value")
+
+
+def test_the_surest_difference_comes_first_and_a_model_that_leaves_more_than_noise_is_said(
+    folder: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(folder / "second", tmp_path / "other")
+
+    def change(result: dict[str, Any]) -> None:
+        result["points"][1]["parameters"]["T_fm"]["value"] *= 2.0
+        result["trust"] = {"verdict": "not-explained", "reasons": []}
+
+    edit(tmp_path / "other" / "result.json", change)
+    found = compare([folder / "first", tmp_path / "other"])
+    assert found.sentence().startswith("T_fm rose by 100 ")
+    assert "; R_s rose by 5 " in found.sentence()
+    assert any("more than noise in other" in note for note in found.notes)
+
+
 def test_an_effect_that_one_study_lacks_is_named(folder: Path, tmp_path: Path) -> None:
     shutil.copytree(folder / "diagnosed", tmp_path / "other")
     edit(tmp_path / "other" / "result.json", lambda r: r.update(effects=[], verdict="no-missing-effect"))

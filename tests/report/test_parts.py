@@ -210,6 +210,20 @@ def test_signals_with_dots_in_every_name_come_back(tmp_path: Path) -> None:
     assert pq.read_schema(path).names == ["time_s", "motor.i_q.measured", "motor.i_q.v1.2"]
 
 
+def test_signals_that_differ_in_case_only_come_back(tmp_path: Path) -> None:
+    time = np.arange(3) * 0.1
+    path = write_signals(
+        tmp_path,
+        "fit",
+        "it's",
+        {"measured": Signals(time, {"v": time, "V": 2.0 * time}, {"v": "m/s", "V": "V"})},
+    )
+    back = read_signals(path)
+    assert back.name == "it's"
+    np.testing.assert_array_equal(back.channels["v"]["measured"], time)
+    np.testing.assert_array_equal(back.channels["V"]["measured"], 2.0 * time)
+
+
 def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
     code = cli.run_command([str(a) for a in arguments])
     captured = capsys.readouterr()

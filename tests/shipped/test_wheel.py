@@ -79,4 +79,4 @@ def test_the_wheel_is_the_product_in_an_empty_folder(bare: tuple[Path, Path], tm
     said = run(bare[1] / "python", "-c", code, folder=tmp_path, ok=False)
     assert "pip install 'thsa-cosim[notebook]'" in said
     size = sum(p.stat().st_size for p in bare[1].parent.rglob("*") if p.is_file() and not p.is_symlink())
-    assert size < 600e6
+    assert size < 500e6

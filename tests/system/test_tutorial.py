@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from system.test_coupled import run
+from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.system.assemble import Part, Wire
 
@@ -40,3 +41,15 @@ def test_the_drive_reaches_its_speed_and_co_simulation_nears_model_exchange(tmp_
     # The stimuli step: first order.
     assert errors[0] < 0.03
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.2)
+
+
+def test_the_tutorials_own_single_fmu_nears_the_coupled_ones_as_its_step_falls(tmp_path: Path) -> None:
+    """OpenModelica's Co-Simulation takes one Euler step for each communication step: first order, 5 % at 1 ms."""
+    exact = speed(tmp_path, None)
+    errors = []
+    for steps in (1_000, 10_000):
+        with Plant.open(ROOT / "MODELICA_Demo.ControlledElectricDrive.fmu") as plant:
+            single = plant.run({}, None, ("w",), np.linspace(0.0, 1.0, steps + 1))["w"]
+        errors.append(float(np.max(np.abs(single[:: steps // 100] - exact)) / np.ptp(exact)))
+    assert errors[1] < 5e-3
+    assert 8.0 < errors[0] / errors[1] < 16.0

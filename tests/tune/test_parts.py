@@ -31,7 +31,8 @@ class Spec:
 def limit(
     metric: str, value: float, upper: bool = True, hard: bool = True, penalty: float = 1.0
 ) -> Requirement:
-    return Requirement(metric, None, "1", value, upper, hard, penalty, 0.01)
+    given = {"maximum" if upper else "minimum": value, "unit": "1", "limit": value, "scale": 0.01}
+    return Requirement.model_construct(metric=metric, hard=hard, penalty=penalty, **given)
 
 
 # one row per condition: J = 1 + 10·0.3 + 100·|-0.02| = 6 and 3 + 4 + 1 = 8

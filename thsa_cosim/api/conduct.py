@@ -233,7 +233,7 @@ def ask(
             f" run 'thsa-cosim {scenario.kind} {scenario.path}'."
         )
     if package is not None and isinstance(scenario, Scenario) and scenario.diagnose is not None:
-        scenario = replace(scenario, diagnose=replace(scenario.diagnose, package=package))
+        scenario = replace(scenario, diagnose=scenario.diagnose.model_copy(update={"package": package}))
     suffix = f"-{command}" if command == "simulate" and scenario.kind != "simulate" else ""
     name = scenario.path.stem if isinstance(source, Path | str) else _slug(scenario.title) or command
     place = Path(folder) if folder is not None else default_folder(Path(name), suffix)

@@ -17,7 +17,6 @@ from thsa_cosim.shipped import copy_example
 
 _EXAMPLES = ("motor", "table4", "driven")
 _NEEDED = (*(f"scenarios/{name}.toml" for name in _EXAMPLES), "modelica/THSA")
-_EXPORTER = ("casadi", "ziglang")
 #: Temperatures of the motor bench that are identified: a double exponential needs four.
 _SOME, _FEW = ("m55", "m40", "m20", "p00", "p25"), ("m55", "m30", "p00", "p25")
 
@@ -55,10 +54,11 @@ def demo(output: Path, quick: bool) -> None:
     """
     from rich.text import Text
 
+    from thsa_cosim.fmu.sources import has_compiler
     from thsa_cosim.report.page.index import Entry, write_index
 
     root = _data(output)
-    can_export = all(importlib.util.find_spec(name) for name in _EXPORTER)
+    can_export = importlib.util.find_spec("casadi") is not None and has_compiler()
     steps = _steps(root, output, quick, can_export)
     output.mkdir(parents=True, exist_ok=True)
     out, begin, entries = console(), time.monotonic(), []

@@ -8,22 +8,20 @@ from typing import Any, Literal
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.inspection import Inspection
 from thsa_cosim.signals import Signals
+from thsa_cosim.study import ChannelError, Comparison
 
 Verdict = Literal["missing-effect", "no-missing-effect", "unexplained-structure", "not-tested"]
 
 
 @dataclass(frozen=True)
-class ChannelError:
-    """A channel's error over some recordings, in its unit: ``rmse``, ``noise`` and the ``structure`` in it (rms).
+class StructuredError(ChannelError):
+    """A channel's error over some recordings, and the ``structure`` in it: rms, in its unit.
 
     ``significance``: the structure's square in standard deviations of what white noise would show.
     """
 
-    rmse: float
-    noise: float
     structure: float
     significance: float
-    samples: int
 
 
 @dataclass(frozen=True)
@@ -186,18 +184,7 @@ class EmpiricalLaw:
     added: bool
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """A recording beside both models' outputs."""
-
-    name: str
-    part: Literal["fit", "validate"]
-    measured: Signals
-    before: Signals | None
-    after: Signals | None
-
-
-Errors = Mapping[str, Mapping[str, ChannelError]]
+Errors = Mapping[str, Mapping[str, StructuredError]]
 """Part ("fit", "validate") or recording → channel → error."""
 
 
@@ -233,7 +220,9 @@ class DiagnosisResult:
     empirical: EmpiricalLaw | None
     equivalence: tuple[EquivalenceClass, ...]
     experiment: SeparatingExperiment | None
-    comparisons: tuple[Comparison, ...]
+    comparisons_before: tuple[Comparison, ...]
+    """Every recording beside the declared model; ``comparisons_after``: beside the extended one, if any."""
+    comparisons_after: tuple[Comparison, ...]
     force_before: ForceBalance | None
     force_after: ForceBalance | None
     threshold: float

@@ -36,13 +36,12 @@ from thsa_cosim.diagnosis.fitting.structure import errors, errors_by_recording
 from thsa_cosim.diagnosis.fitting.trials import Trial, spec_of, trials_of, with_fmu, with_wrapper
 from thsa_cosim.diagnosis.fitting.uncertainty import standard_errors
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
-from thsa_cosim.diagnosis.results import ChannelError, Comparison, DiagnosisResult, EmpiricalLaw
+from thsa_cosim.diagnosis.results import DiagnosisResult, EmpiricalLaw, StructuredError
 from thsa_cosim.errors import StudyError
 from thsa_cosim.export.compile import native_platform
 from thsa_cosim.identify import ForceBalance, force_balance
 from thsa_cosim.scenario import DiagnoseSpec, Scenario
-from thsa_cosim.study import Comparison as Compared
-from thsa_cosim.study import Place, Study, describe, study_identity
+from thsa_cosim.study import Comparison, Place, Study, describe, reached, study_identity
 
 #: The folder of the superset inside a study.
 WORK = "superset"
@@ -220,7 +219,8 @@ class _Closing:
             experiment=separating_experiment(
                 scenario, self.spec, found, self.bench.trials, self.study.open_runner
             ),
-            comparisons=_comparisons(before, after if changed else None),
+            comparisons_before=_comparisons(before),
+            comparisons_after=_comparisons(after) if changed else (),
             force_before=_force(scenario, before),
             force_after=_force(scenario, after) if changed else None,
             threshold=found.rounds[0].threshold if found.rounds else 0.0,
@@ -273,7 +273,7 @@ def _sure(identified: Identified) -> np.ndarray:
     return np.asarray(np.sqrt(own**2 + identified.apart**2 + identified.fit.remaining_step**2))
 
 
-def _errors(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
+def _errors(identified: Identified) -> dict[str, Mapping[str, StructuredError]]:
     parts = {"fit": identified.fit.residual, "validate": identified.validate}
     return {
         part: errors(tuple(t for t in identified.trials if t.part == part), residual)
@@ -281,8 +281,8 @@ def _errors(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
     }
 
 
-def _errors_by_recording(identified: Identified) -> dict[str, Mapping[str, ChannelError]]:
-    found: dict[str, Mapping[str, ChannelError]] = {}
+def _errors_by_recording(identified: Identified) -> dict[str, Mapping[str, StructuredError]]:
+    found: dict[str, Mapping[str, StructuredError]] = {}
     for part, residual in (("fit", identified.fit.residual), ("validate", identified.validate)):
         trials = tuple(t for t in identified.trials if t.part == part)
         for name, channels in errors_by_recording(trials, residual).items():
@@ -303,17 +303,21 @@ def _untested(found: Attribution, effects: Iterable[str]) -> str:
     return f"no effect could be tried: nothing in the fit recordings depends on {names}"
 
 
-def _comparisons(before: Identified, after: Identified | None) -> tuple[Comparison, ...]:
-    return tuple(
-        Comparison(
-            t.case.name,
-            t.part,
-            t.case.measured,
-            before.signals.get(t.name),
-            None if after is None else after.signals.get(t.name),
-        )
-        for t in before.trials
-    )
+def _comparisons(identified: Identified) -> tuple[Comparison, ...]:
+    """Every recording beside the model."""
+    found = []
+    for part, residual in (("fit", identified.fit.residual), ("validate", identified.validate)):
+        trials = [t for t in identified.trials if t.part == part]
+        own = errors_by_recording(trials, residual)
+        for t in trials:
+            simulated = identified.signals.get(t.name)
+            if simulated is not None:
+                measured = reached(t.case.measured, simulated)
+                beside = simulated.select(measured.names).resample(measured.time)
+                found.append(
+                    Comparison(t.case.name, part, t.case.temperature_degC, measured, beside, own[t.case.name])
+                )
+    return tuple(found)
 
 
 def _force(scenario: Scenario, identified: Identified) -> ForceBalance | None:
@@ -321,17 +325,12 @@ def _force(scenario: Scenario, identified: Identified) -> ForceBalance | None:
     spec = scenario.force
     if spec is None:
         return None
-    fit, compared, masses = identified.fit, [], []
+    fit, compared = identified.fit, _comparisons(identified)
+    masses: dict[tuple[str, str], float] = {}
     for trial in identified.trials:
-        simulated = identified.signals.get(trial.name)
-        if simulated is not None:
-            measured = trial.case.measured
-            compared.append(
-                Compared(trial.case.name, trial.part, None, measured, simulated.resample(measured.time), {})
-            )
-            values = {**trial.case.fixed, **fit.unknowns.assignments(fit.vector, trial.group)}
-            masses.append(values.get(spec.mass, spec.mass_at_start))
+        values = {**trial.case.fixed, **fit.unknowns.assignments(fit.vector, trial.group)}
+        masses[trial.part, trial.case.name] = values.get(spec.mass, spec.mass_at_start)
     try:
-        return force_balance(spec, compared, masses)
+        return force_balance(spec, compared, [masses[c.role, c.recording] for c in compared])
     except ValueError:
         return None  # a recording too short for the band has no force residual

@@ -8,6 +8,7 @@ model is in ``runtime/``.
 import dataclasses
 import os
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,7 +51,8 @@ def export_fmu(
     start_values:
         Start values of parameters that replace those of the model, in the model's units.
     platforms:
-        What to compile for, by the names of FMI 2.0 or 3.0 (``win64``, ``x86_64-linux``, …); default all.
+        What to compile for, by the names of FMI 2.0 or 3.0 (``win64``, ``x86_64-linux``, …); default all, or this
+        machine's where its own compiler is the only one.
     libraries:
         Further Modelica libraries: packages' folders, folders of packages (such as a Modelica tool's library folder) or
         ``.mo`` files; those of the environment variable MODELICAPATH follow. Only what the class uses is read.
@@ -62,7 +64,7 @@ def export_fmu(
     ParameterError
         A start value names no parameter of the model, or a platform is unknown.
     MissingExtraError
-        CasADi or ziglang is not installed.
+        CasADi is not installed, or there is no C compiler for a platform.
     """
     if fmi not in (2, 3):
         raise ModelicaError(f"FMI version {fmi} is not supported; choose 2 or 3.")
@@ -76,7 +78,7 @@ def export_fmu(
     except ImportError as error:
         raise MissingExtraError("Exporting a Modelica model", "export") from error
     from thsa_cosim.export.archive import write_fmu
-    from thsa_cosim.export.compile import PLATFORMS
+    from thsa_cosim.export.compile import PLATFORMS, available_platforms
 
     causal = causal_model(model, package, libraries)
     if start_values:
@@ -91,7 +93,7 @@ def export_fmu(
             for v in causal.variables
         )
         causal = dataclasses.replace(causal, variables=variables)
-    chosen = list(PLATFORMS)
+    chosen = list(available_platforms())
     if platforms is not None:
         names = {name: p for p in PLATFORMS for name in (p.fmi2, p.fmi3) if name}
         for name in platforms:
@@ -101,6 +103,12 @@ def export_fmu(
                     f"Platform {name!r} is unknown; choose from {listed}.{did_you_mean(name, names)}"
                 )
         chosen = [p for p in PLATFORMS if p in [names[name] for name in platforms]]
+    if platforms is None and len(chosen) == 1:
+        warnings.warn(
+            f"The FMU is for {chosen[0].fmi3} only, built by this machine's C compiler; the other platforms need an "
+            "optional part: pip install 'thsa-cosim[export]'.",
+            stacklevel=2,
+        )
     if output is None:
         output = Path(causal.flat.name.rsplit(".", 1)[-1] + ".fmu")
     date = float(os.environ.get("SOURCE_DATE_EPOCH", time.time()))

@@ -1,5 +1,7 @@
 """C sources → shared libraries for every platform, by ``ziglang`` (a C compiler in a wheel).
 
+Without that, gcc or clang of this machine builds for this machine.
+
 What was compiled is kept by the digest of sources, flags, target and compiler, so that one study leaves it to the next.
 """
 
@@ -11,11 +13,13 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from platform import machine as machine_name
 
 from thsa_cosim.errors import MissingExtraError, ThsaCosimError
+from thsa_cosim.fmu.sources import host_compiler
 
 
 @dataclass(frozen=True)
@@ -66,23 +70,11 @@ KEPT = 64
 def compile_library(folder: Path, sources: Sequence[str], platform: Platform, output: Path) -> None:
     """Compile ``sources`` of ``folder`` to a shared library for ``platform``, unless it was compiled before.
 
-    Raises MissingExtraError without ziglang and ThsaCosimError with the compiler's first line when it fails.
+    Raises MissingExtraError without a compiler for it and ThsaCosimError with the compiler's first line when it fails.
     """
-    version = compiler_version()
+    compiler, version = _compiler(platform)
     flags = [flag for flag in FLAGS if not (flag == "-fPIC" and platform.suffix == ".dll")]
-    command = [
-        sys.executable,
-        "-m",
-        "ziglang",
-        "cc",
-        "-target",
-        platform.target,
-        *flags,
-        "-I.",
-        *sources,
-        "-o",
-        str(output),
-    ]
+    command = [*compiler, *flags, "-I.", *sources, "-o", str(output)]
     if platform.suffix == ".so":
         command.append("-lm")
     kept = _kept(folder, [version, platform.target, *flags, *sources], platform.suffix)
@@ -132,9 +124,30 @@ def _keep(library: Path, kept: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def compiler_version() -> str:
-    """Version of the ziglang wheel; raises MissingExtraError when it is not installed."""
+def available_platforms() -> tuple[Platform, ...]:
+    """What can be built for here: every platform with ziglang, else this machine."""
+    return PLATFORMS if ziglang_version() else (native_platform(),)
+
+
+def _compiler(platform: Platform) -> tuple[list[str], str]:
+    """The command that compiles for ``platform``, and its version."""
+    if version := ziglang_version():
+        return [sys.executable, "-m", "ziglang", "cc", "-target", platform.target], version
+    own = host_compiler() if platform == native_platform() and platform.suffix != ".dll" else None
+    if own is None:
+        raise MissingExtraError(f"Compiling an FMU for {platform.fmi3}", "export")
+    return [own], _version(own)
+
+
+def ziglang_version() -> str | None:
+    """Version of the ziglang wheel; None when it is not installed."""
     try:
         return metadata.version("ziglang")
-    except metadata.PackageNotFoundError as error:
-        raise MissingExtraError("Compiling an FMU", "export") from error
+    except metadata.PackageNotFoundError:
+        return None
+
+
+@cache
+def _version(compiler: str) -> str:
+    done = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=False)
+    return done.stdout.partition("\n")[0]

@@ -11,7 +11,16 @@ from thsa_cosim.modelica.flatten import flatten_class
 from thsa_cosim.modelica.library import Library, unversioned
 from thsa_cosim.modelica.syntax import ClassDefinition, Component, Extends
 
-__all__ = ["Experiment", "FlatEquation", "FlatModel", "FlatVariable", "flatten", "list_models", "locate"]
+__all__ = [
+    "Experiment",
+    "FlatEquation",
+    "FlatModel",
+    "FlatVariable",
+    "components",
+    "flatten",
+    "list_models",
+    "locate",
+]
 
 
 def flatten(model: str, package: Path, libraries: Sequence[Path] = (), *, folded: bool = False) -> FlatModel:
@@ -43,6 +52,46 @@ def locate(model: str, package: Path, libraries: Sequence[Path] = ()) -> tuple[P
     """File and qualified name of a class given by name or ``.mo`` file; raises ModelicaError if there is none."""
     _, file, name = _find(model, package, libraries)
     return file, name
+
+
+def components(model: str, package: Path, libraries: Sequence[Path] = ()) -> dict[str, Component]:
+    """Components that a class declares or inherits, by name, less those that an extends clause redeclares.
+
+    Raises ModelicaError if the class, or one that it extends, is not found.
+    """
+    library, _, name = _find(model, package, libraries)
+    definition = library.find(name)
+    assert definition is not None  # `_find` has found it
+    found: dict[str, Component] = {}
+    _gather(library, definition, name, found)
+    return found
+
+
+def _gather(library: Library, definition: ClassDefinition, name: str, found: dict[str, Component]) -> None:
+    redeclared: set[str] = set()
+    for element in definition.elements:
+        if isinstance(element, Extends):
+            base, base_name = _base(library, element.type, name)
+            if base is None:
+                continue  # a built-in type, or what flattening reports better
+            own: dict[str, Component] = {}
+            _gather(library, base, base_name, own)
+            taken = {a.redeclare.name for a in element.arguments if isinstance(a.redeclare, Component)}
+            found |= {key: value for key, value in own.items() if key not in taken}
+            redeclared |= taken
+    for element in definition.elements:
+        if isinstance(element, Component) and element.name not in redeclared:
+            found[element.name] = element
+
+
+def _base(library: Library, base: str, name: str) -> tuple[ClassDefinition | None, str]:
+    """A class by its name as written in the class ``name``: looked up from there outwards (MLS 3.6, 5.3)."""
+    scope = name.split(".")
+    for depth in range(len(scope), -1, -1):
+        qualified = ".".join([*scope[:depth], base.lstrip(".")])
+        if qualified != name and (found := library.find(qualified)) is not None:
+            return found, qualified
+    return None, base
 
 
 def list_models(library: Path, search: Sequence[Path] = ()) -> list[str]:

@@ -76,10 +76,20 @@ def _build(path: Path, options: list[str], files: list[str], folder: Path) -> No
         )
 
 
+def host_compiler() -> str | None:
+    """The machine's own C compiler: what CC names, cc, gcc or clang; None without one."""
+    names = (os.environ.get("CC", ""), "cc", "gcc", "clang")
+    return next((name for name in names if name and shutil.which(name)), None)
+
+
+def has_compiler() -> bool:
+    """Whether C can be compiled here, by the machine's compiler or the ziglang wheel's."""
+    return host_compiler() is not None or importlib.util.find_spec("ziglang") is not None
+
+
 def _compiler() -> list[str]:
-    for name in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
-        if name and shutil.which(name):
-            return [name]
+    if own := host_compiler():
+        return [own]
     if importlib.util.find_spec("ziglang"):
         return [sys.executable, "-m", "ziglang", "cc"]
     raise FmuError("There is no C compiler here; install gcc or clang, or pip install ziglang.")

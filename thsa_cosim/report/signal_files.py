@@ -1,8 +1,8 @@
 """Signals in the study folder: ``signals/<role>/<recording>.parquet``, measured beside simulated.
 
 Columns: ``time_s``, then ``<channel>.<variant>`` in the channel's unit; variants are ``measured`` and ``simulated``,
-or what else was compared (``before``, ``after``). The schema's metadata hold, as JSON, ``units`` (channel → unit)
-and ``variants``. ``pandas.read_parquet`` reads the columns, ``read_signals`` both.
+or what else was compared (``before``, ``after``). The file's metadata hold, as JSON, ``units`` (channel → unit),
+``variants`` and ``columns``. ``pandas.read_parquet`` reads the columns, ``read_signals`` both.
 """
 
 import json
@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from thsa_cosim.errors import InputError
-from thsa_cosim.recordings.arrow import from_numpy, to_numpy
+from thsa_cosim.recordings.parquet_file import read_columns, read_metadata, write_columns
 from thsa_cosim.signals import FloatArray, Signals
 
 FOLDER = "signals"
@@ -53,12 +51,12 @@ def write_signals(folder: Path, role: str, name: str, variants: Mapping[str, Sig
         for channel in signals.names:
             columns[f"{channel}.{variant}"] = np.where(beyond, np.nan, on_samples[channel])
             units[channel] = signals.units[channel]
-    table = pa.table({key: from_numpy(values) for key, values in columns.items()})
     facts = {"units": json.dumps(units), "variants": json.dumps(list(variants)), "name": name, "role": role}
+    facts["columns"] = json.dumps(list(columns))
     path = folder / FOLDER / file_name(role) / f"{file_name(name)}.parquet"
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(".part")
-    pq.write_table(table.replace_schema_metadata(facts), partial)
+    write_columns(partial, columns, facts)
     partial.replace(path)
     return path
 
@@ -66,12 +64,16 @@ def write_signals(folder: Path, role: str, name: str, variants: Mapping[str, Sig
 def read_signals(path: Path) -> SignalFile:
     """Read what ``write_signals`` wrote; InputError for any other file."""
     try:
-        with pq.ParquetFile(path) as file:
-            table = file.read()
-        facts = _facts(path, table.schema)
-        columns = {n: np.asarray(to_numpy(table[n]), dtype=np.float64) for n in table.column_names}
+        metadata = read_metadata(path)
+        facts = _facts(path, metadata)
+        read = read_columns(path, lambda names: names)
+        names = json.loads(metadata.get("columns", "null")) or list(read)
+        columns = {
+            name: np.asarray(column.values, dtype=np.float64)
+            for name, column in zip(names, read.values(), strict=True)
+        }
         time = columns.pop(TIME)
-    except (OSError, KeyError, ValueError, pa.ArrowException) as error:
+    except (OSError, KeyError, ValueError) as error:
         reason = " ".join(str(error).split())[:120]
         raise InputError(
             f"{path} holds no signals of a study ({reason}); repeat the study's command."
@@ -96,8 +98,7 @@ class _Facts:
     variants: list[str]
 
 
-def _facts(path: Path, schema: pa.Schema) -> _Facts:
-    found = {key.decode(): value.decode() for key, value in (schema.metadata or {}).items()}
+def _facts(path: Path, found: Mapping[str, str]) -> _Facts:
     return _Facts(
         role=found.get("role", path.parent.name),
         name=found.get("name", path.stem),
@@ -110,7 +111,7 @@ def signal_units(folder: Path) -> dict[str, str]:
     """Unit by channel over all signal files of a study folder."""
     units: dict[str, str] = {}
     for path in signal_paths(folder):
-        units.update(_facts(path, pq.read_schema(path)).units)
+        units.update(_facts(path, read_metadata(path)).units)
     return units
 
 

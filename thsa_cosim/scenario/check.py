@@ -214,10 +214,9 @@ def _black_box(path: Path, spec: DiagnoseOptionsTable, fmu: FmuDescription) -> B
         )
     if spec.blackbox is None:
         return None
-    names = spec.blackbox.model_dump(exclude_none=True)
-    for key, name in names.items():
+    for key, name in spec.blackbox.model_dump(exclude_none=True).items():
         readable(fmu, name, f"diagnose.blackbox.{key}")
-    return BlackBoxSpec(command=spec.command, load=spec.load, **names)
+    return BlackBoxSpec.resolved(spec.blackbox, command=spec.command, load=spec.load)
 
 
 def readable(fmu: FmuDescription, name: str, key: str) -> Variable:

@@ -13,6 +13,7 @@ from thsa_cosim.inspection import Inspection, inspect
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario.schema import (
+    BlackBoxTable,
     CommonTable,
     CostTable,
     DiagnoseOptionsTable,
@@ -21,6 +22,7 @@ from thsa_cosim.scenario.schema import (
     SearchTable,
     SimulationTable,
 )
+from thsa_cosim.scenario.table import Name
 from thsa_cosim.signals import Signals
 
 
@@ -30,20 +32,11 @@ class ForceSpec(ForceTable):
     mass_at_start: float
 
 
-@dataclass(frozen=True)
-class BlackBoxSpec:
-    """What an FMU without source calls its signals: inputs ``command`` and ``load``, the others are outputs.
+class BlackBoxSpec(BlackBoxTable):
+    """``[diagnose.blackbox]`` with the inputs ``command`` and ``load`` of ``[diagnose]``. None: no such signal."""
 
-    ``speed`` as its sensor reads it; ``motor_speed`` is what the controller holds. None: there is no such signal.
-    """
-
-    command: str | None = None
-    load: str | None = None
-    speed: str | None = None
-    position: str | None = None
-    motor_speed: str | None = None
-    current: str | None = None
-    voltage: str | None = None
+    command: Name | None = None
+    load: Name | None = None
 
 
 class DiagnoseSpec(DiagnoseOptionsTable):
@@ -55,7 +48,7 @@ class DiagnoseSpec(DiagnoseOptionsTable):
     package: Path  # type: ignore[assignment]
     catalogue: Path | None  # type: ignore[assignment]
     spreads: Mapping[str, float]
-    blackbox: BlackBoxSpec | None = None  # type: ignore[assignment]
+    blackbox: BlackBoxSpec | None = None
     """Of an FMU without source: ``model`` is None then."""
 
 

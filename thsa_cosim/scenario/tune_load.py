@@ -278,16 +278,7 @@ def _requirement(
         except UnitError as error:
             raise UnitError(f"{key}: {error}") from None
         scale = abs(limit) or 1.0
-    return Requirement(
-        metric=spec.metric,
-        signal=spec.signal,
-        unit=unit,
-        limit=limit,
-        upper=spec.maximum is not None,
-        hard=spec.hard,
-        penalty=spec.penalty,
-        scale=spec.scale or scale,
-    )
+    return Requirement.resolved(spec, unit=unit, limit=limit, scale=spec.scale or scale)
 
 
 def _cost(table: TuneTable, command: CommandSpec, fmu: FmuDescription) -> ControlCostSpec:
@@ -297,9 +288,7 @@ def _cost(table: TuneTable, command: CommandSpec, fmu: FmuDescription) -> Contro
         scale = convert(1.0, unit, source) if source else 1.0
     except UnitError as error:
         raise UnitError(f"cost.unit: {error}") from None
-    return ControlCostSpec(
-        unit, scale, table.cost.kappa_rise, table.cost.kappa_steady, table.cost.steady == "signed"
-    )
+    return ControlCostSpec.resolved(table.cost, unit=unit, scale=scale)
 
 
 def _loop(table: TuneTable, ends: float, fmu: FmuDescription, space: ParameterSpace) -> LoopSpec | None:

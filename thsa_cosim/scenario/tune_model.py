@@ -13,14 +13,17 @@ from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario.schema import SearchTable, SimulationTable
 from thsa_cosim.scenario.tune_schema import (
+    ControlCostTable,
     LineTable,
     LoopTable,
     MetricsTable,
     ParetoTable,
+    RequirementTable,
     ScheduleTable,
     StartTable,
     SurfaceTable,
     TuneTable,
+    UncertaintyTable,
 )
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.units import convert
@@ -106,29 +109,19 @@ def combinations(axes: Sequence[Axis]) -> tuple[Condition, ...]:
     return tuple(conditions)
 
 
-@dataclass(frozen=True)
-class ControlCostSpec:
-    """Eq. 7: velocity errors are divided by ``scale`` (one ``unit`` in the command input's unit)."""
+class ControlCostSpec(ControlCostTable):
+    """``[cost]`` with its unit; velocity errors are divided by ``scale`` (one ``unit`` in the command input's unit)."""
 
     unit: str
     scale: float
-    kappa_rise: float
-    kappa_steady: float
-    signed: bool
 
 
-@dataclass(frozen=True)
-class Requirement:
-    """A limit on a metric, in ``unit``; ``scale`` is the excess that counts as 1."""
+class Requirement(RequirementTable):
+    """One of ``[[requirements]]`` with its ``limit`` in ``unit``; ``scale`` is the excess that counts as 1."""
 
-    metric: str
-    signal: str | None
     unit: str
+    scale: float
     limit: float
-    upper: bool
-    hard: bool
-    penalty: float
-    scale: float
 
     @property
     def name(self) -> str:
@@ -137,7 +130,8 @@ class Requirement:
 
     def tightened(self, reserve: float) -> "Requirement":
         """Return the same with its limit moved inwards by a share of its size."""
-        return replace(self, limit=self.limit - (reserve if self.upper else -reserve) * abs(self.limit))
+        moved = self.limit - (reserve if self.upper else -reserve) * abs(self.limit)
+        return self.model_copy(update={"limit": moved})
 
 
 class LoopSpec(LoopTable):
@@ -159,17 +153,9 @@ class CovariancePoint:
     correlation: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class UncertaintySpec:
-    """Samples of FMU parameters around their values.
+class UncertaintySpec(UncertaintyTable):
+    """``[uncertainty]`` with what was read; ``factors`` turn the unit of each of ``variables`` into the FMU's."""
 
-    ``variables`` are shifted, one per identified parameter; ``factors`` turn its unit into the FMU's. The
-    condition ``temperature`` picks the nearest point.
-    """
-
-    samples: int
-    temperature: str | None
-    variables: tuple[str, ...]
     factors: tuple[float, ...]
     points: tuple[CovariancePoint, ...]
 

@@ -202,6 +202,11 @@ class ControlCostTable(Table):
     steady: Literal["absolute", "signed"] = "absolute"
     """``"signed"`` takes e_ss as the article prints it, which rewards running too fast."""
 
+    @property
+    def signed(self) -> bool:
+        """Whether the steady-state error counts with its sign."""
+        return self.steady == "signed"
+
 
 if TYPE_CHECKING:
     Metric = str
@@ -228,6 +233,11 @@ class RequirementTable(Table):
     """Of a soft limit, per ``scale`` of excess."""
     scale: Positive | None = None
     """What an excess is measured in; left out: the limit's size."""
+
+    @property
+    def upper(self) -> bool:
+        """Whether the limit is a maximum."""
+        return self.maximum is not None
 
     @model_validator(mode="after")
     def _complete(self) -> "RequirementTable":

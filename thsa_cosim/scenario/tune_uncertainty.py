@@ -56,9 +56,7 @@ def read_uncertainty(
             factors.append(conversion(units[name], variable.unit or units[name])[0])
         except UnitError as error:
             raise UnitError(f"{key}: {error}") from None
-    return UncertaintySpec(
-        spec.samples, spec.temperature, tuple(spec.variables.values()), tuple(factors), tuple(read)
-    )
+    return UncertaintySpec.resolved(spec, factors=tuple(factors), points=tuple(read))
 
 
 def _point(point: Mapping[str, Any], wanted: Mapping[str, str]) -> CovariancePoint:

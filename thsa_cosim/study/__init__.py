@@ -21,6 +21,7 @@ from thsa_cosim.study.comparison import (
     case_residuals,
     compare,
     compare_case,
+    reached,
     summarise,
 )
 from thsa_cosim.study.coupling import CouplingError, coupling_error
@@ -63,6 +64,7 @@ __all__ = [
     "interleave",
     "is_made_from",
     "note_made_from",
+    "reached",
     "stacked",
     "stages_identity",
     "study_identity",

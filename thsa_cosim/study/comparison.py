@@ -42,9 +42,7 @@ def compare(
 
     ``noise``: 1 σ by signal; one that is not there has the recording's own estimate.
     """
-    reached = simulated.time[-1] * (1.0 + 1e-12) + 1e-9
-    whole = recording.compared.select(names)
-    measured = whole if whole.time[-1] <= reached else whole.window(stop=reached)
+    measured = reached(recording.compared.select(names), simulated)
     on_samples = simulated.select(names).resample(measured.time)
     errors = {}
     for name in names:
@@ -57,6 +55,12 @@ def compare(
             samples=int(np.count_nonzero(kept)),
         )
     return Comparison(recording.name, role, recording.temperature_degC, measured, on_samples, errors)
+
+
+def reached(measured: Signals, simulated: Signals) -> Signals:
+    """The samples of ``measured`` that a simulation came to."""
+    end = simulated.time[-1] * (1.0 + 1e-12) + 1e-9
+    return measured if measured.time[-1] <= end else measured.window(stop=end)
 
 
 def compare_case(case: Case, recording: Recording, role: str, simulated: Signals) -> Comparison:

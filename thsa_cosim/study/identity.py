@@ -57,7 +57,8 @@ def study_identity(scenario: Scenario | TuneScenario, kind: str | None = None) -
         for profile in scenario.profiles:
             asked[f"profile.recordings[{profile.recording.name}]"] = digest_of_recording(profile.recording)
         if scenario.uncertainty is not None:
-            asked["uncertainty.result"] = digest_of_text(repr(_plain(scenario.uncertainty)))
+            read = (scenario.uncertainty.factors, scenario.uncertainty.points)
+            asked["uncertainty.result"] = digest_of_text(repr(_plain(read)))
     else:
         asked |= _of_recordings(scenario)
     if wanted == "diagnose" and isinstance(scenario, Scenario) and scenario.diagnose is not None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -324,7 +324,7 @@ class _Tuning:
             notes=tuple(self.notes),
             settings={
                 **scenario.search.model_dump(),
-                "cost": asdict(scenario.cost),
+                "cost": {**scenario.cost.model_dump(exclude={"steady"}), "signed": scenario.cost.signed},
                 "combine": scenario.combine,
             },
         )

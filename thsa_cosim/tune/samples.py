@@ -23,7 +23,7 @@ def samples_at(scenario: TuneScenario, condition: Condition) -> tuple[dict[str, 
     samples = []
     for deviation in deviations(point, random) * np.array(spec.factors):
         values = {}
-        for name, shift in zip(spec.variables, deviation.tolist(), strict=True):
+        for name, shift in zip(spec.variables.values(), deviation.tolist(), strict=True):
             variable = scenario.fmu.variables[name]
             value = scenario.fixed.get(name, variable.start or 0.0) + shift
             low = -np.inf if variable.minimum is None else variable.minimum

@@ -5,7 +5,6 @@ import pickle
 import re
 import subprocess
 import sys
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -25,7 +24,9 @@ from thsa_cosim.signals import Signals
 
 ROOT = Path(__file__).parents[3]
 FMU = ROOT / "fmus" / "THSA.fmu"
-NAMES = BlackBoxSpec("v_cmd", "F_load", "v", "x", "w_m", "i_q", "u_q")
+NAMES = BlackBoxSpec(
+    command="v_cmd", load="F_load", speed="v", position="x", motor_speed="w_m", current="i_q", voltage="u_q"
+)
 OUTPUTS = ("v", "x", "w_m", "i_q", "u_q")
 NOISE = {"v": 2e-5, "x": 1e-6, "w_m": 0.2, "i_q": 0.05, "u_q": 0.3}
 TIME = np.arange(0.0, 4.0, 1e-3)
@@ -200,6 +201,7 @@ def test_laws_are_those_of_the_catalogue() -> None:
     for (effect, _), law in laws(None).items():
         if effect in ("stribeck", "windage", "load-dependent-friction", "shear-thinning"):
             p = {"dF": 1.0, "v_S": 0.1, "n": 2.0, "b_q": 1.0, "mu": 0.1, "mu_S": 0.1, "mu_2": 0.1, "v_0": 0.1}
+            p |= {"n_S": 1.0, "mu_v": 0.1, "mu_D": 0.05, "mu_A": 0.04}
             assert np.all(law(p, at) * at["v"] >= 0.0)
 
 
@@ -220,7 +222,7 @@ def test_black_box_needs_names(tmp_path: Path) -> None:
     path = tmp_path / "s.toml"
     text = scenario_text().replace("_fit_*", "_fit_1").replace("_validate_*", "_validate_1")
     path.write_text(text, encoding="utf-8")
-    assert load_scenario(path).diagnose.blackbox == replace(NAMES)  # type: ignore[union-attr]
+    assert load_scenario(path).diagnose.blackbox == NAMES  # type: ignore[union-attr]
     path.write_text(text.replace('speed = "v"', 'speed = "velocity"', 1), encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"diagnose\.blackbox\.speed.*velocity"):
         load_scenario(path)

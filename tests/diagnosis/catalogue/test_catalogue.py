@@ -118,6 +118,21 @@ def test_a_model_without_slots_and_an_unknown_effect_are_refused_in_one_sentence
         choose(EFFECTS, ("stribek",), "x.toml: diagnose.effects")
 
 
+def test_slots_are_inherited_less_those_that_are_taken(tmp_path: Path, slots: tuple[Slot, ...]):
+    assert find_slots("THSA.ThermalActuator", PACKAGE) == slots
+    own = tmp_path / "Motor2.mo"
+    own.write_text(
+        "model Motor2\n"
+        "  extends THSA.Examples.BrushlessMotor(\n"
+        "    // redeclare THSA.Effects.Stribeck torqueEffect,\n"
+        "    redeclare THSA.Effects.Windage motorEffect(b_q=1e-7));\n"
+        "end Motor2;\n",
+        encoding="utf-8",
+    )
+    base = find_slots("THSA.Examples.BrushlessMotor", PACKAGE)
+    assert find_slots(str(own), PACKAGE) == tuple(slot for slot in base if slot.name != "motor")
+
+
 def test_effects_of_ones_own_folder_come_beside_the_known_effects(tmp_path: Path):
     own = (Path(known_effects.__code__.co_filename).parent / "effects" / "windage.py").read_text(
         encoding="utf-8"

@@ -75,6 +75,7 @@ def torque(rig: Rig, force: float = LOAD, motor: float = 0.0, gear: float = 0.0,
 
 W_M = SPEED / rig().k * rig().i
 SCREW_FORCE = LOAD + rig().F_fn + rig().b_n * SPEED
+THREAD = 0.02 + 0.05 * np.exp(-1.0) + 0.5 * SPEED - 0.01 + 4e-3
 STEADY: dict[str, tuple[dict[str, float], Callable[[Rig], float]]] = {
     "declared": ({}, lambda r: torque(r) / r.K_t),
     "stribeck:screw": (
@@ -90,6 +91,22 @@ STEADY: dict[str, tuple[dict[str, float], Callable[[Rig], float]]] = {
     "load-dependent-friction:screw": (
         {"screwEffect.loadDependentFriction.mu": 0.04},
         lambda r: torque(r, nut=SCREW_FORCE * 0.04 / (1.0 - 0.04)) / r.K_t,
+    ),
+    # A thread: a breakaway part of its own, more with the speed, and another share for each flank and flow of power.
+    "load-dependent-friction:screw, thread": (
+        {
+            f"screwEffect.loadDependentFriction.{name}": value
+            for name, value in {
+                "mu": 0.02,
+                "mu_S": 0.05,
+                "v_S": SPEED,
+                "n_S": 1.0,
+                "mu_v": 0.5,
+                "mu_D": -0.01,
+                "mu_A": 4e-3,
+            }.items()
+        },
+        lambda r: torque(r, nut=SCREW_FORCE * THREAD / (1.0 - THREAD)) / r.K_t,
     ),
     "load-dependent-friction:motor": (
         {"motorEffect.loadDependentFriction.mu": 0.04},

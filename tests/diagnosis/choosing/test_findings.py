@@ -7,15 +7,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from thsa_cosim.diagnosis.catalogue.known import known_effects
 from thsa_cosim.diagnosis.choosing.attribution import Round
 from thsa_cosim.diagnosis.choosing.chance import probability
 from thsa_cosim.diagnosis.choosing.findings import (
+    NO_MORE,
     found_effects,
     judged,
+    order_of,
     undetermined,
     vague,
     values_of,
 )
+from thsa_cosim.diagnosis.choosing.orders import Machine, Order
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
@@ -36,15 +40,20 @@ def parameter(variable: str, role: str = "coefficient", **more: Any) -> Any:
 
 
 def proposal(
-    effect: str, gain: float, place: str = "motor", information: float = 1.0, start: float = 0.0
+    effect: str,
+    gain: float,
+    place: str = "motor",
+    information: float = 1.0,
+    start: float = 0.0,
+    typical: float = 1.0,
 ) -> Any:
-    own = parameter(f"{place}.{effect}.k", scanned=False)
+    own = parameter(f"{place}.{effect}.k", scanned=False, typical=typical)
     candidate: Any = SimpleNamespace(
         effect=SimpleNamespace(name=effect, title=f"Title of {effect}"),
         name=f"{effect}:{place}",
         key=f"{effect}:{place}/x0",
         component=effect,
-        slot=SimpleNamespace(name=place),
+        slot=SimpleNamespace(name=place, interface="FrictionEffect"),
         parameters=(own,),
         coefficients=(own,),
     )
@@ -122,6 +131,23 @@ def test_a_candidate_is_not_testable_if_ten_times_its_ordinary_size_would_drown_
     for information, decision in ((1.01 * limit, "not refined"), (0.99 * limit, "not testable")):
         own = one_round([proposal("a", 1.0, information=information)], [], None, ())
         assert judged(attribution(own))[0].decision == decision
+        large = one_round([proposal("a", 1.0, information=information / 9.0, typical=3.0)], [], None, ())
+        assert judged(attribution(large))[0].decision == decision, "what is usual is three times as large"
+
+
+def test_the_accepted_one_comes_first_though_others_gain_more_and_what_was_refined_before_the_rest():
+    accepted, more, promised = proposal("a", 60.0), proposal("b", 95.0), proposal("c", 99.0)
+    one, two = scored(accepted), scored(more)
+    two.fit_gain = 77.0
+    own = one_round([promised, more, accepted], [two, one], one, ("b is chance", ""))
+    made = judged(attribution(own, accepted=(one,)))
+    assert [(j.name[0], j.fit_gain) for j in made] == [("a", 60.0), ("b", 77.0), ("c", 99.0)]
+    assert made[1].reason == "b is chance"
+
+
+def test_what_promises_just_as_much_as_chance_was_left_to_those_that_promise_more():
+    own = one_round([proposal("a", 17.0)], [], None, ())
+    assert judged(attribution(own))[0].reason == "promises less than those that were refined"
 
 
 def test_gains_and_values_are_those_of_the_fit_where_there_is_one_else_what_was_promised(found: Any):
@@ -129,6 +155,7 @@ def test_gains_and_values_are_those_of_the_fit_where_there_is_one_else_what_was_
     assert made["a"].parameters["k"].value == 4.0
     assert made["d"].parameters["k"].value == 2.0
     assert made["d"].parameters["k"].stderr == pytest.approx(1.0)
+    assert made["d"].parameters["k"].unit == "N"
     assert made["e"].p_value == pytest.approx(probability(3.0, GAINS))
     assert 0.5 < made["e"].p_value < 1.0
     assert made["a"].p_value < 1e-9
@@ -160,6 +187,10 @@ def test_what_was_accepted_and_dropped_again_or_accepted_later_is_said_to_be():
     plain = one_round([first, second], [one, two], one, ("",))
     made = {(j.name[0], j.round): j for j in judged(attribution(plain, later, accepted=(one, again)))}
     assert made["b", 1].reason == "explains the held-out recordings less well; accepted in round 2"
+    alone = {(j.name[0], j.round): j for j in judged(attribution(plain, later, accepted=(again,)))}
+    assert alone["b", 1].reason == "explains the held-out recordings less well; accepted in round 2"
+    dropped = {(j.name[0], j.round): j for j in judged(attribution(plain, later, accepted=(one,)))}
+    assert dropped["b", 1].reason == "explains the held-out recordings less well", "not accepted after all"
 
 
 def test_an_effect_is_as_probable_as_chance_and_its_rivals_leave_it(found: Any):
@@ -167,6 +198,9 @@ def test_an_effect_is_as_probable_as_chance_and_its_rivals_leave_it(found: Any):
     assert (effect.name, effect.title, effect.equivalent) == ("a:motor", "Title of a", ("b:motor",))
     assert effect.probability == pytest.approx(0.5)
     assert effect.parameters["k"].value == 4.0
+    assert (effect.parameters["k"].variable, effect.parameters["k"].role) == ("motor.a.k", "coefficient")
+    (sure,) = found_effects(found, found.accepted[0].fit, stderr=np.array([0.5, 0.7]))
+    assert sure.parameters["k"].stderr == 0.7
     weak = scored(replace(found.accepted[0].proposal, gain=8.0))
     alone = attribution(one_round([weak.proposal], [weak], weak, ("",)), accepted=(weak,))
     (effect,) = found_effects(alone, weak.fit)
@@ -176,11 +210,13 @@ def test_an_effect_is_as_probable_as_chance_and_its_rivals_leave_it(found: Any):
 
 def test_ways_of_one_effect_are_one_with_its_places_spelt_out():
     members = [scored(proposal("a", 90.0)), scored(proposal("a", 80.0, "gear")), scored(proposal("b", 70.0))]
-    rounds = [one_round([m.proposal], [m], m, ("",)) for m in members]
+    rivals = [(), (), (scored(proposal("c", 69.0)),)]
+    rounds = [one_round([m.proposal], [m], m, ("",), r) for m, r in zip(members, rivals, strict=True)]
     unknowns = Unknowns(tuple(unknown(m.candidate.parameters[0].variable) for m in members))
     fit = Fit(unknowns, np.array([1.0, 2.0, 3.0]), np.ones(50), np.eye(50, 3) * 9, np.ones(3), 0.0, True)
     effects = found_effects(attribution(*rounds, accepted=tuple(members)), fit)
     assert [e.name for e in effects] == ["a:motor", "b:motor"]
+    assert [e.equivalent for e in effects] == [(), ("c:motor",)], "each has the rivals of its own round"
     assert {n: v.value for n, v in effects[0].parameters.items()} == {"motor.a.k": 1.0, "gear.a.k": 2.0}
     assert {n: v.value for n, v in effects[1].parameters.items()} == {"k": 3.0}
 
@@ -192,6 +228,7 @@ def test_values_are_widened_by_what_is_left_and_split_into_declared_and_effects(
     assert values_of(wide, declared=True)["p"].stderr == pytest.approx(2.0)
     assert list(values_of(fit, declared=False)) == ["motor.a.k"]
     assert values_of(fit, declared=True)["p"] == Value(1.0, "N", pytest.approx(1.0))
+    assert values_of(fit, declared=True, stderr=np.array([0.3, 0.1]))["p"].stderr == 0.3
     ended = replace(fit, vector=np.array([9.0, 4.0]))
     assert values_of(ended, declared=True)["p"].reason == "it ended at the end of its range, 9 N"
 
@@ -203,6 +240,7 @@ def test_a_value_at_its_bound_unseen_or_only_known_from_the_drawing_is_not_deter
     assert undetermined(own, -9.0, 7e-7) == "it ended at the end of its range, -9 N"
     assert undetermined(own, 1.0, np.inf) == "nothing in the recordings depends on it"
     assert undetermined(own, 1.0, 0.47) == ""
+    assert undetermined(own, 1.0, NO_MORE * 0.5) == ""
     assert undetermined(own, 1.0, 0.48) == "the recordings say no more of it than the drawing"
     assert undetermined(unknown("k"), 1.0, 42.0) == "", "an effect's own: see vague"
 
@@ -216,6 +254,10 @@ def test_a_coefficient_of_an_effect_that_its_error_covers_is_not_determined():
     assert vague(members, {"dF": Value(1.5, "N", 0.49)})["dF"].identifiable
     assert not vague(members, {"dF": Value(1.5, "N", 0.51)})["dF"].identifiable
     assert vague(members, {"dF": Value(1.5, "N", 42.0, "other")})["dF"].reason == "other"
+    assert vague(members, {"dF": Value(3.0, "N", 1.0)})["dF"].identifiable, "just a third"
+    gain: Any = [SimpleNamespace(candidate=SimpleNamespace(parameters=(parameter("g", neutral=1.0),)))]
+    assert not vague(gain, {"g": Value(1.2, "N", 0.1)})["g"].identifiable, "0.2 from doing nothing"
+    assert vague(gain, {"g": Value(1.4, "N", 0.1)})["g"].identifiable
 
 
 def test_a_ripples_sine_may_be_zero_beside_its_cosine_and_a_shape_counts_by_itself():
@@ -233,3 +275,77 @@ def test_a_ripples_sine_may_be_zero_beside_its_cosine_and_a_shape_counts_by_itse
     found = vague(members, values)
     assert {n for n, v in found.items() if not v.identifiable} == {"other"}
     assert not vague(members, {**values, "n": Value(12.0, "1", 4.1)})["n"].identifiable
+    turned = {**values, "s": values["c"], "c": values["s"]}
+    assert {n for n, v in vague(members, turned).items() if not v.identifiable} == {"other"}
+
+
+#: A nut on a screw with a lead of 10 mm, behind a gear of 30.
+LEAD = 2.0 * np.pi / 10e-3
+MACHINE = Machine(
+    {"nut": {"motor": 30.0 * LEAD, "gearbox": LEAD}, "gearbox": {"motor": 30.0, "gearbox": 1.0}},
+    {"nut": 0.03, "gearbox": 19.0},
+)
+
+
+def ripple(effect: str, place: str, wave: float, fitted: bool = True, block: str = "RippleFriction") -> Any:
+    """An effect that repeats with ``wave`` at a place, with its amplitude and wave number as unknowns of its fit."""
+    own = (
+        parameter(f"{place}.{effect}.a", scanned=False),
+        parameter(f"{place}.{effect}.n", "shape", scanned=True, unit="rad/m"),
+    )
+    made = replace(proposal(effect, 90.0, place), shapes={} if fitted else {"n": wave})
+    made.candidate.parameters, made.candidate.coefficients = own, own[:1]
+    made.candidate.variant = SimpleNamespace(block=block)
+    names = own if fitted else own[:1]
+    unknowns = Unknowns(tuple(unknown(p.variable, upper=1e5) for p in names))
+    vector = np.array([2.0, wave])[: len(names)]
+    fit = Fit(unknowns, vector, np.zeros(50), 1e4 * np.eye(50, len(names)), np.ones(len(names)), 0.0, True)
+    one = scored(made)
+    one.fit = fit
+    return one
+
+
+def test_a_ripple_and_its_rivals_go_by_the_shaft_that_they_repeat_over():
+    accepted = ripple("cogging", "nut", 1.0001 * LEAD)
+    rivals = (
+        ripple("position-friction", "nut", LEAD),  # the same once it is named
+        ripple("screw-ripple", "gearbox", 2.0),
+        ripple("screw-ripple", "gearbox", 24.0 * 30.0),
+        ripple("screw-ripple", "nut", 1.37 * LEAD),
+    )
+    own = one_round([accepted.proposal], [accepted], accepted, ("",), rivals)
+    (effect,) = found_effects(attribution(own, accepted=(accepted,)), accepted.fit, MACHINE)
+    assert effect.name == "screw-ripple:nut"
+    assert effect.title == known_effects()["screw-ripple"].title
+    assert effect.order == "1 per turn of the gearbox"
+    assert effect.equivalent == ("screw-ripple:gearbox", "cogging:gearbox", "position-friction:nut")
+    assert effect.probability == pytest.approx(0.25)
+    assert effect.parameters["n"].role == "shape"
+    (plain,) = found_effects(attribution(own, accepted=(accepted,)), accepted.fit)
+    assert (plain.name, plain.order) == ("position-friction:nut", ""), "of no machine no ratio is known"
+
+
+def test_orders_of_several_shafts_are_said_each_with_its_own():
+    members = [ripple("cogging", "gearbox", wave) for wave in (12.0 * 30.0, 2.0, 18.0 * 30.0)]
+    for number, member in enumerate(members):
+        for p in member.candidate.parameters:
+            p.variable += str(number)
+        names = (unknown(p.variable, upper=1e5) for p in member.candidate.parameters)
+        member.fit = replace(member.fit, unknowns=Unknowns(tuple(names)))
+    rounds = [one_round([m.proposal], [m], m, ("",)) for m in members]
+    unknowns = Unknowns(tuple(u for m in members for u in m.fit.unknowns.members))
+    vector = np.concatenate([m.fit.vector for m in members])
+    fit = Fit(unknowns, vector, np.zeros(50), 1e4 * np.eye(50, 6), np.ones(6), 0.0, True)
+    (effect,) = found_effects(attribution(*rounds, accepted=tuple(members)), fit, MACHINE)
+    assert effect.order == "12, 18 per turn of the motor; 2 per turn of the gearbox"
+
+
+def test_the_order_of_a_wave_that_no_fit_changes_is_that_of_its_start():
+    fixed = ripple("cogging", "gearbox", 12.0 * 30.0, fitted=False)
+    assert order_of(fixed, {}, MACHINE) == Order("motor", 12)
+    fitted = {"gearbox.cogging.n": Value(18.0 * 30.0, "1", 1e-3)}
+    assert order_of(fixed, fitted, MACHINE) == Order("motor", 18), "a fitted value counts more"
+    assert order_of(ripple("cogging", "gearbox", 1.0), {}, MACHINE) is None, (
+        "of an unknown wave there is none"
+    )
+    assert order_of(scored(proposal("a", 90.0, "gearbox")), {}, MACHINE) is None

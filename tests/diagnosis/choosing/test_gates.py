@@ -14,6 +14,7 @@ from thsa_cosim.diagnosis.choosing.gates import (
     insignificant,
     near_best,
     objection,
+    objection_beside,
     out_of_range,
     signal_share,
 )
@@ -60,6 +61,15 @@ def test_a_further_effect_has_to_explain_more():
     )
     assert objection(replace(PASSES, share=0.19), LIMIT, True) == ""
     assert objection(replace(PASSES, share=0.2), LIMIT, False) == ""
+
+
+def test_a_further_part_of_an_effect_is_judged_by_its_gain_and_not_by_its_share():
+    """The seventh order of a ripple explains little of what the declared model left, and is there all the same."""
+    part = replace(PASSES, share=0.0, signal_share=0.0, visible=True)
+    assert objection_beside(part, LIMIT) == ""
+    for name in ("fit_gain", "held_out_gain", "consistency", "left"):
+        value, says = MISSES[name]
+        assert says in objection_beside(replace(part, **{name: value}), LIMIT)
 
 
 def test_the_share_of_a_signal_is_that_of_the_one_that_gains_most():
@@ -159,6 +169,7 @@ def test_a_declared_parameter_at_the_end_of_its_range_is_named():
     ("start", "spread", "lower", "value", "name"),
     [
         (0.01, 0.02, 0.0, 0.0, ""),  # friction of unknown size: there may be none
+        (0.02, 0.02, 0.0, 0.0, ""),  # just as well
         (0.03, 0.02, 0.0, 0.0, "p"),  # the drawing says that there is some
         (0.01, 0.02, 0.0, 1.0, "p"),  # the other end
         (0.01, 0.02, 0.005, 0.005, "p"),  # an end that is not nothing

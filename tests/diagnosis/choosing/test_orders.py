@@ -63,6 +63,41 @@ def test_a_ripple_of_the_motor_is_known_wherever_it_was_found(machine: Machine):
     assert machine.order("nowhere", 1.0, 0.0) is None
 
 
+def test_a_wave_has_to_be_as_near_as_the_travel_can_tell():
+    """Less than 0.125 rad over half of a travel of 1: less than 0.25 apart."""
+    own = Machine(
+        {"x": {"wheel": 16.0}, "y": {"wheel": 12.0}, "z": {"wheel": 1.0}}, {"x": 1.0, "y": 1.0, "z": 1.0}
+    )
+    assert own.order("x", 48.2, 0.0) == Order("wheel", 3)
+    assert own.order("x", 48.25, 0.0) is None
+    assert own.order("z", 3.0, 0.0) == Order("wheel", 3)
+    assert own.order("y", 36.0, 0.95) == Order("wheel", 3), "six standard errors are less than half an order"
+    assert own.order("y", 36.0, 1.0) is None
+
+
+def test_where_the_travel_tells_more_than_the_fit_three_standard_errors_are_near():
+    own = Machine({"x": {"wheel": 20.0}}, {"x": 100.0})
+    assert own.order("x", 61.4, 0.5) == Order("wheel", 3)
+    assert own.order("x", 61.5, 0.5) is None
+    assert own.order("x", 60.5, 0.9) == Order("wheel", 3)
+    assert own.order("x", 60.5, 1.0) is None, "too wide an interval: a twentieth of an order"
+
+
+def test_of_two_shafts_the_slower_one_and_of_a_slow_one_the_first_dozen_of_orders():
+    own = Machine({"x": {"cam": 2.0, "wheel": 1.0, "motor": 0.25}}, {"x": 1.0})
+    assert own.order("x", 36.0, 0.0) == Order("motor", 144)
+    only = Machine({"x": {"cam": 2.0, "wheel": 1.0}}, {"x": 1.0})
+    assert only.order("x", 6.0, 0.0) == Order("wheel", 6)
+    assert only.order("x", 12.0, 0.0) == Order("wheel", 12)
+    assert only.order("x", 14.0, 0.0) == Order("cam", 7), "14 per turn of the wheel are too many"
+
+
+def test_small_motions_have_ratios_too_and_no_recording_has_no_travel():
+    small = {"motorEffect.z": 3e-3 * np.sin(TIME), "gearboxEffect.z": 1e-3 * np.sin(TIME)}
+    assert machine_of(SLOTS, {"a": Signals(TIME, small)}).turns["motor"]["gearbox"] == pytest.approx(1 / 3)
+    assert machine_of(SLOTS, {}).travel == {"motor": 0.0, "gearbox": 0.0, "screw": 0.0}
+
+
 def test_what_slips_or_stands_has_no_ratio():
     slipping = Signals(
         TIME,

@@ -72,3 +72,15 @@ def test_a_model_that_fits_worse_counts_less(errors: dict[int, list[float]]):
     np.testing.assert_allclose(added(winner, forms=(worse,))[0], np.exp(-1.5))
     worse.fit = replace(worse.fit, cost=600.0)
     assert added(winner, forms=(worse,))[0] < 1e-9
+
+
+def test_what_rivals_of_several_effects_bend_adds_up(errors: dict[int, list[float]]):
+    first, second = model([1.0, 4.0, 2.0]), model([1.0, 4.0, 2.0], block="z")
+    second.proposal = object()
+    bent = (model([1.3, 4.0, 2.0], effect="c:motor"), model([1.4, 4.0, 2.0], effect="d:motor"))
+    rounds = [
+        SimpleNamespace(accepted=one, rivals=(rival,), forms=())
+        for one, rival in zip((first, second), bent, strict=True)
+    ]
+    found: Any = SimpleNamespace(accepted=(first, second), rounds=rounds)
+    np.testing.assert_allclose(between_models(found, second.fit, ())[0], 0.5)

@@ -70,7 +70,13 @@ def trials(*lengths: int, noise: float = 0.5) -> list[Any]:
             )
             for name in ("v", "i")
         ]
-        made.append(SimpleNamespace(case=SimpleNamespace(channels=channels)))
+        made.append(
+            SimpleNamespace(
+                case=SimpleNamespace(
+                    channels=channels, measured=SimpleNamespace(units={"v": "m/s", "i": "A"})
+                )
+            )
+        )
     return made
 
 
@@ -170,6 +176,10 @@ def test_every_sample_counts_the_same_in_a_pooled_error():
     found = errors(own, residual)["v"]
     assert found.rmse == pytest.approx(np.sqrt((100 * 0.2**2 + 300 * 0.6**2) / 400))
     assert found.noise == pytest.approx(np.sqrt((100 * 0.1**2 + 300 * 0.2**2) / 400))
+    assert (found.unit, found.samples) == ("m/s", 400)
+    assert np.isnan(found.nrmse), "what stands still has no range"
+    own[0].case.channels[0].measured = np.linspace(-1.0, 3.0, 100)
+    assert errors(own, residual)["v"].nrmse == pytest.approx(found.rmse / 4.0)
     for trial, name in zip(own, "ab", strict=True):
         trial.case.name = name
     each = errors_by_recording(own, residual)

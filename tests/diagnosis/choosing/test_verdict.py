@@ -7,9 +7,14 @@ import numpy as np
 import pytest
 
 from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
-from thsa_cosim.diagnosis.results import ChannelError
+from thsa_cosim.diagnosis.results import StructuredError
 
-NOTHING = ChannelError(1.0, 1.0, 0.05, 2.0, 1000)
+
+def error(noise: float, structure: float, significance: float, rmse: float = 3.0) -> StructuredError:
+    return StructuredError(rmse, 0.5, noise, "A", 1000, structure, significance)
+
+
+NOTHING = error(1.0, 0.05, 2.0)
 #: Structure in standard deviations of the noise, significance, accepted effects, candidates → verdict.
 CASES = {
     "noise only": (0.05, 2.0, 0, 40, "no-missing-effect"),
@@ -29,9 +34,15 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_verdict(name: str):
     structure, significance, accepted, tested, expected = CASES[name]
-    shown = ChannelError(9.0, 2.0, 2.0 * structure, significance, 1000)
+    shown = error(2.0, 2.0 * structure, significance)
     assert verdict_on({"v": NOTHING, "i": shown}, accepted, tested) == expected
     assert verdict_on({"i": shown, "v": NOTHING}, accepted, tested) == expected
+
+
+def test_a_gross_error_is_no_noise_even_where_few_samples_make_it():
+    gross = error(2.0, 6.0, 1.5, rmse=6.1)
+    assert verdict_on({"v": NOTHING, "i": gross}, 0, 40) == "unexplained-structure"
+    assert verdict_on({"v": NOTHING, "i": gross}, 1, 40) == "missing-effect"
 
 
 def test_the_share_that_is_left_is_that_of_the_worst_signal_that_shows_anything():
@@ -39,7 +50,8 @@ def test_the_share_that_is_left_is_that_of_the_worst_signal_that_shows_anything(
     channels = [
         SimpleNamespace(name=n, measured=np.zeros(samples), noise=0.5, weight=1.0) for n in ("v", "i", "u")
     ]
-    trials: Any = [SimpleNamespace(case=SimpleNamespace(channels=channels))]
+    measured = SimpleNamespace(units=dict.fromkeys(("v", "i", "u"), "A"))
+    trials: Any = [SimpleNamespace(case=SimpleNamespace(channels=channels, measured=measured))]
     smooth = np.sin(np.arange(samples) * 0.01) * np.sqrt(2.0)
     noise = np.random.default_rng(5).standard_normal(3 * samples)
 

@@ -22,7 +22,7 @@ def write_wrapper(folder: Path, fmu: Path, wrapper: EffectWrapper, values: Mappi
     terms = [t for t in wrapper.terms if t.acts(values)]
     content = {
         "fmu": str(fmu),
-        "signals": asdict(wrapper.signals),
+        "signals": wrapper.signals.model_dump(),
         "drive": wrapper.drive.to_dict(),
         "effects": [
             {**{k: v for k, v in asdict(t).items() if k != "starts"}, "parameters": t.values(values)}

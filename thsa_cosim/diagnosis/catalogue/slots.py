@@ -1,20 +1,15 @@
 """The effect slots of a model: which places it offers, and the units there.
 
-A slot is a replaceable component at the top level of a Modelica class, named ``<place>Effect`` and constrained by one
-of the partial blocks of ``THSA.Interfaces``.
+A slot is a replaceable component at the top level of a Modelica class, own or inherited, named ``<place>Effect`` and
+constrained by one of the partial blocks of ``THSA.Interfaces``.
 """
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from thsa_cosim.errors import ModelicaError
-from thsa_cosim.export.flatten import flatten, locate
-
-SLOT = re.compile(
-    r"\breplaceable\s+[\w.]+\s+(\w+)Effect\b(?:[^;\"]|\"[^\"]*\")*?\bconstrainedby\s+(?:\w+\.)*(\w+)"
-)
+from thsa_cosim.export.flatten import components, flatten, locate
 
 #: Per interface the connector variables that an effect reads, those that it gives, and the scales' variables.
 INPUTS: Mapping[str, tuple[str, ...]] = {
@@ -25,6 +20,7 @@ INPUTS: Mapping[str, tuple[str, ...]] = {
     "TorqueConstantEffect": ("i_q",),
     "VoltageEffect": ("i_q",),
     "SensorEffect": ("u",),
+    "PhaseEffect": ("i_q", "phi"),
 }
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "FrictionEffect": ("F",),
@@ -34,6 +30,7 @@ OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "TorqueConstantEffect": ("g_t", "g_e"),
     "VoltageEffect": ("du",),
     "SensorEffect": ("d",),
+    "PhaseEffect": ("d", "du"),
 }
 SCALES: Mapping[str, Mapping[str, str]] = {
     "FrictionEffect": {"V": "v", "Z": "z", "F": "N"},
@@ -43,7 +40,10 @@ SCALES: Mapping[str, Mapping[str, str]] = {
     "TorqueConstantEffect": {"I": "i_q"},
     "VoltageEffect": {"I": "i_q"},
     "SensorEffect": {"I": "u"},
+    "PhaseEffect": {"I": "i_q"},
 }
+#: The position over which effects may repeat, of the interfaces that have one whose residual is searched for it.
+POSITION: Mapping[str, str] = {"FrictionEffect": "z", "PhaseEffect": "phi"}
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,27 @@ class Slot:
         """Name of the component in the model."""
         return self.name + "Effect"
 
+    @property
+    def position(self) -> str | None:
+        """FMU variable of the position over which effects here may repeat, if there is one."""
+        own = POSITION.get(self.interface)
+        return None if own is None else f"{self.component}.{own}"
+
+    @property
+    def is_angular(self) -> bool:
+        """Whether that position is an angle."""
+        return self.units.get(POSITION.get(self.interface, "")) == "rad"
+
 
 def find_slots(model: str, package: Path) -> tuple[Slot, ...]:
-    """The slots that a Modelica class declares itself; ModelicaError if it has none."""
+    """The free slots that a Modelica class declares or inherits; ModelicaError if it has none."""
     file, name = locate(model, package)
-    text = re.sub(r"//.*|/\*.*?\*/", " ", file.read_text(encoding="utf-8"), flags=re.S)
-    declared = [(m[1], m[2]) for m in SLOT.finditer(text) if m[2] in INPUTS]
+    declared = [
+        (component.name.removesuffix("Effect"), interface)
+        for component in components(model, package).values()
+        if "replaceable" in component.prefixes and component.name.endswith("Effect") and component.constraint
+        if (interface := component.constraint[0].rsplit(".", 1)[-1]) in INPUTS
+    ]
     if not declared:
         raise ModelicaError(
             f"{file}: class {name} has no effect slot (a replaceable component <place>Effect constrained by a block of"

@@ -27,7 +27,7 @@ from thsa_cosim.study import Case, export_digest, is_made_from, note_made_from
 class Superset:
     """The FMU with all effects, its slots, and the candidates with the scales of this drive.
 
-    ``signals_at``: start values by case → the inputs of every friction slot by case.
+    ``signals_at``: start values by case → the inputs of every slot with a position, by case.
     """
 
     fmu: Path
@@ -125,9 +125,18 @@ def slot_signals(
     values: Mapping[str, Mapping[str, float]],
     open_: Opening,
 ) -> dict[str, Signals]:
-    """Inputs of every friction slot over each recording, by case name, at the given start values per case."""
+    """What effects read in every slot with a position, by case name, at the given start values per case.
+
+    The position, and of a friction slot the speed and the load.
+    """
+    friction = (s for s in slots if s.interface == "FrictionEffect")
     outputs = tuple(
-        f"{s.component}.{v}" for s in slots if s.interface == "FrictionEffect" for v in ("v", "z", "N")
+        dict.fromkeys(
+            [
+                *(f"{s.component}.{v}" for s in friction for v in ("v", "z", "N")),
+                *(s.position for s in slots if s.position),
+            ]
+        )
     )
     experiments = [_with_outputs(case, outputs) for case in cases]
     with open_(experiments) as runner:

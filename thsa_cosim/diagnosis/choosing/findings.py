@@ -120,7 +120,9 @@ def _orders(orders: Sequence[Order]) -> str:
 
 
 def _named(scored: Scored, order: Order | None) -> str:
-    ripple = any(p.scanned for p in scored.candidate.parameters)
+    # What the phases do keeps its name: its order is a multiple of the pole pairs, and no torque.
+    phases = scored.candidate.slot.interface == "PhaseEffect"
+    ripple = not phases and any(p.scanned for p in scored.candidate.parameters)
     return name_by_order(scored.candidate, order) if ripple else scored.candidate.name
 
 

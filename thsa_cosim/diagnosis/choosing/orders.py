@@ -53,13 +53,12 @@ class Machine:
         Of two that fit, that of the slower shaft: its few low orders are the likelier.
         """
         shafts = sorted(self.turns.get(slot, {}).items(), key=lambda item: item[1])
-        reach = self.travel.get(slot, 0.0)
         for shaft, ratio in shafts:
             number = round(wave / ratio)
             apart = abs(wave - number * ratio)
             # As near as the travel can tell, and six standard errors do not reach half the way to the next order;
             # a wave that is only as near as its error has to be sharper, or any would be near.
-            close = apart * 0.5 * reach < PHASE and max(stderr, 0.0) < ratio / 12.0
+            close = apart * 0.5 * self.travel[slot] < PHASE and max(stderr, 0.0) < ratio / 12.0
             near = apart < 3.0 * stderr and max(stderr, 0.0) < 0.05 * ratio
             if 1 <= number <= (FAST if shaft == "motor" else SLOW) and (close or near):
                 return Order(shaft, number)
@@ -73,31 +72,32 @@ class Machine:
 
 
 def machine_of(slots: Sequence[Slot], signals: Mapping[str, Signals]) -> Machine:
-    """The ratios between the friction slots, from their positions ``<component>.z`` in every simulated recording."""
-    friction = [s for s in slots if s.interface == "FrictionEffect"]
+    """The ratios between the slots with a position, from every simulated recording; shafts are friction slots."""
+    placed = [s for s in slots if s.position is not None]
+    friction = [s for s in placed if s.interface == "FrictionEffect"]
     positions = {
         s.name: np.concatenate([own - own.mean() for own in _positions(s, signals)] or [np.zeros(1)])
-        for s in friction
+        for s in placed
     }
     turns: dict[str, dict[str, float]] = {}
-    for place in friction:
+    for place in placed:
         z, own = positions[place.name], turns.setdefault(place.name, {})
         for shaft in friction:
             turn = positions[shaft.name]
-            if shaft.units.get("z") == "rad" and z @ z > 0.0 and turn @ turn > 0.0:
+            if shaft.is_angular and z @ z > 0.0 and turn @ turn > 0.0:
                 ratio = float(turn @ z / (z @ z))
                 left = turn - ratio * z
                 if left @ left <= (1.0 - RIGID) * (turn @ turn):
                     own[shaft.name] = abs(ratio)
     travel = {
-        s.name: max((float(np.ptp(own)) for own in _positions(s, signals)), default=0.0) for s in friction
+        s.name: max((float(np.ptp(own)) for own in _positions(s, signals)), default=0.0) for s in placed
     }
     return Machine(turns, travel)
 
 
 def _positions(slot: Slot, signals: Mapping[str, Signals]) -> list[np.ndarray]:
-    name = f"{slot.component}.z"
-    return [run[name] for run in signals.values() if name in run]
+    name = slot.position
+    return [run[name] for run in signals.values() if name is not None and name in run]
 
 
 def name_by_order(candidate: Candidate, order: Order | None) -> str:

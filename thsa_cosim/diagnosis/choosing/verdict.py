@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from thsa_cosim.diagnosis.fitting.structure import errors, worst_share
 from thsa_cosim.diagnosis.fitting.trials import Trial
-from thsa_cosim.diagnosis.results import ChannelError, Verdict
+from thsa_cosim.diagnosis.results import StructuredError, Verdict
 from thsa_cosim.signals import FloatArray
 
 #: Structure (rms in standard deviations of the noise, in some signal) and its significance that count as visible in a
@@ -13,21 +13,24 @@ VISIBLE, SIGNIFICANT = 0.15, 6.0
 #: ... and in one with effects, whose form and contact with the solver's steps are never quite those of the machine:
 #: an error of 1.1 times the noise.
 VISIBLE_BESIDE = 0.46
+#: Without an effect, a held-out error of so many times the noise is no noise, however few samples make it.
+GROSS = 3.0
 
 
-def verdict_on(errors_after: Mapping[str, ChannelError], accepted: int, tested: int) -> Verdict:
+def verdict_on(errors_after: Mapping[str, StructuredError], accepted: int, tested: int) -> Verdict:
     """The verdict on held-out ``errors_after`` with ``accepted`` effects out of ``tested`` candidates.
 
     In standard deviations, not in shares: a hundredth of a large residual may still be a fault that anybody sees.
     """
-    if is_visible(errors_after, VISIBLE_BESIDE if accepted else VISIBLE):
+    gross = not accepted and any(e.rmse > GROSS * e.noise for e in errors_after.values())
+    if gross or is_visible(errors_after, VISIBLE_BESIDE if accepted else VISIBLE):
         return "unexplained-structure" if tested else "not-tested"
     if accepted:
         return "missing-effect"
     return "no-missing-effect" if tested else "not-tested"
 
 
-def is_visible(found: Mapping[str, ChannelError], size: float) -> bool:
+def is_visible(found: Mapping[str, StructuredError], size: float) -> bool:
     """Whether some signal holds structure that is neither chance nor smaller than ``size`` (in its noise)."""
     return any(e.structure > size * e.noise and e.significance > SIGNIFICANT for e in found.values())
 

@@ -30,11 +30,11 @@ def wave_number_finder(
     signals_at: Callable[[Mapping[str, Mapping[str, float]]], Mapping[str, Signals]],
     machine: Machine,
 ) -> Callable[[Fit], Mapping[str, Sequence[float]]]:
-    """Return a function: fit → per friction slot the wave numbers at which its residuals repeat, and the machine's.
+    """Return a function: fit → per slot with a position its residuals' wave numbers and the machine's.
 
-    ``signals_at``: start values by case → ``<slot's component>.z`` of every friction slot by case.
+    ``signals_at``: start values by case → the position of every slot that has one, by case.
     """
-    chosen = [slot for slot in slots if slot.interface == "FrictionEffect"]
+    chosen = [(slot, slot.position) for slot in slots if slot.position is not None]
     trials = bench.of("fit")
 
     def scan(fit: Fit) -> Mapping[str, Sequence[float]]:
@@ -42,17 +42,16 @@ def wave_number_finder(
         signals = signals_at(values)
         residuals = per_trial(trials, fit.residual)
         found: dict[str, Sequence[float]] = {}
-        for slot in chosen:
+        for slot, position in chosen:
             positions, own = [], []
             for t, parts in zip(trials, residuals, strict=True):
                 run = signals.get(t.case.name)
                 if run is not None:
                     times = t.case.channels[0].time
-                    positions.append(np.interp(times, run.time, run[f"{slot.component}.z"]))
+                    positions.append(np.interp(times, run.time, run[position]))
                     own.append([p for p in parts.values() if p.size == times.size])
-            angular = slot.units.get("z") == "rad"
             reach = max((float(np.max(np.abs(z))) for z in positions), default=1.0) or 1.0
-            grid = _HARMONICS if angular else 2.0 * np.pi * _PERIODS / reach
+            grid = _HARMONICS if slot.is_angular else 2.0 * np.pi * _PERIODS / reach
             found[slot.name] = (*wave_numbers(positions, own, grid), *machine.starts(slot.name))
         return found
 

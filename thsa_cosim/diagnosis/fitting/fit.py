@@ -11,6 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
+from thsa_cosim.search import DifferenceSettings, answer, difference_columns
 from thsa_cosim.signals import FloatArray
 
 #: A difference step moves the residuals by this much in all (their norm, in standard deviations), or by this share of
@@ -106,41 +107,10 @@ def columns(
     A column whose response was far from ``response`` (default: RESPONSE, or SHARE of the residuals' norm) is taken
     again with a better step; one that cannot be simulated is zero.
     """
-    found = np.zeros((centre.size, len(which)))
-    steps = steps.copy()
     aim = max(RESPONSE, SHARE * float(np.linalg.norm(centre))) if response is None else response
-    open_ = list(range(len(which)))
-    for _ in range(3):
-        vectors = np.repeat(vector[None, :], len(open_), axis=0)
-        taken = np.zeros(len(open_))
-        for row, k in enumerate(open_):
-            j = which[k]
-            vectors[row, j] += steps[j] * unknowns.scale[j]
-            vectors[row] = unknowns.clip(vectors[row])
-            if abs(vectors[row, j] - vector[j]) < 0.5 * abs(steps[j]) * unknowns.scale[j]:
-                vectors[row, j] = vector[j] - steps[j] * unknowns.scale[j]
-                vectors[row] = unknowns.clip(vectors[row])
-            taken[row] = (vectors[row, j] - vector[j]) / unknowns.scale[j]
-        again = []
-        for row, (k, residual) in enumerate(
-            zip(open_, bench.residuals(unknowns, vectors, "fit"), strict=True)
-        ):
-            j = which[k]
-            if residual is None or taken[row] == 0.0:
-                steps[j] *= 0.1
-                again.append(k)
-                continue
-            difference = residual - centre
-            norm = float(np.linalg.norm(difference))
-            found[:, k] = difference / taken[row]
-            wanted = float(np.clip(steps[j] * aim / max(norm, 1e-12), SMALLEST, LARGEST))
-            if not 0.1 * aim < norm < 10.0 * aim and not 0.5 < wanted / steps[j] < 2.0:
-                again.append(k)
-            steps[j] = wanted
-        open_ = again
-        if not open_:
-            break
-    return found, steps
+    settings = DifferenceSettings(aim, 0.0, smallest=SMALLEST, largest=LARGEST, repeats=2)
+    asked = difference_columns(vector, centre, steps, unknowns.box, settings, which)
+    return answer(asked, lambda vectors: bench.residuals(unknowns, vectors, "fit"))
 
 
 def refine(

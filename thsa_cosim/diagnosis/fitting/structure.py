@@ -11,9 +11,10 @@ import numpy as np
 from scipy.stats import norm, rankdata
 from scipy.stats import t as student
 
+from thsa_cosim.costs import signal_range
 from thsa_cosim.costs.channels import Channel
 from thsa_cosim.diagnosis.fitting.trials import Trial
-from thsa_cosim.diagnosis.results import ChannelError
+from thsa_cosim.diagnosis.results import StructuredError
 from thsa_cosim.signals import FloatArray
 
 #: The scatter over fewer blocks of time than this says little.
@@ -72,33 +73,40 @@ def worst_share(
     return float(np.clip(max(shares, default=0.0), 0.0, 1.0))
 
 
-def errors(trials: Sequence[Trial], residual: FloatArray) -> Mapping[str, ChannelError]:
+def errors(trials: Sequence[Trial], residual: FloatArray) -> Mapping[str, StructuredError]:
     """Per channel the error over the recordings, every sample of which counts the same."""
     noises: dict[str, list[float]] = {}
+    measured: dict[str, list[FloatArray]] = {}
+    units: dict[str, str] = {}
     for trial in trials:
+        units.update(trial.case.measured.units)
         for channel in trial.case.channels:
             noises.setdefault(channel.name, []).append(float(channel.noise / np.sqrt(channel.weight)))
+            measured.setdefault(channel.name, []).append(channel.measured)
     found = {}
     for name, parts in split(trials, residual).items():
         sizes = np.array([part.size for part in parts])
         noise = float(np.sqrt(np.average(np.square(noises[name]), weights=sizes)))
         squares = sum(s**2 * float(p @ p) for s, p in zip(noises[name], parts, strict=True))
         mean, deviation = lagged(parts)
-        found[name] = ChannelError(
-            rmse=float(np.sqrt(squares / sizes.sum())),
+        rmse, span = float(np.sqrt(squares / sizes.sum())), signal_range(np.concatenate(measured[name]))
+        found[name] = StructuredError(
+            rmse=rmse,
+            nrmse=rmse / span if span > 0.0 else float("nan"),
             noise=noise,
+            unit=units.get(name, "1"),
+            samples=int(sizes.sum()),
             structure=float(np.sqrt(max(mean, 0.0))) * noise,
             significance=mean / deviation,
-            samples=int(sizes.sum()),
         )
     return found
 
 
 def errors_by_recording(
     trials: Sequence[Trial], residual: FloatArray
-) -> dict[str, Mapping[str, ChannelError]]:
+) -> dict[str, Mapping[str, StructuredError]]:
     """Per recording, by its name, the error of each channel."""
-    found: dict[str, Mapping[str, ChannelError]] = {}
+    found: dict[str, Mapping[str, StructuredError]] = {}
     position = 0
     for trial in trials:
         size = sum(c.measured.size for c in trial.case.channels)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
+from thsa_cosim.search import Box
 from thsa_cosim.signals import FloatArray
 
 
@@ -57,11 +58,16 @@ class Unknowns:
         """(n,) 1/spread, 0 where nothing is known."""
         return np.array([1.0 / u.spread if np.isfinite(u.spread) else 0.0 for u in self.members])
 
-    def clip(self, vector: FloatArray) -> FloatArray:
-        """``vector`` (n,) within the bounds."""
+    @property
+    def box(self) -> Box:
+        """Bounds and scales (n,)."""
         lower = np.array([u.lower for u in self.members])
         upper = np.array([u.upper for u in self.members])
-        return np.asarray(np.clip(vector, lower, upper))
+        return Box(lower, upper, self.scale)
+
+    def clip(self, vector: FloatArray) -> FloatArray:
+        """``vector`` (n,) within the bounds."""
+        return self.box.clip(vector)
 
     def prior(self, vector: FloatArray) -> FloatArray:
         """(n,) deviation of ``vector`` from what is known, in standard deviations."""

@@ -7,7 +7,7 @@ those of separate recordings are; z = d / that. Beyond |z| = 2 a difference is u
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from scipy.stats import norm
 from thsa_cosim.errors import InputError
 from thsa_cosim.report.compare.ripple import amplitude, pairs
 from thsa_cosim.report.folder import Json, Study, read_study
-from thsa_cosim.report.parts.text import degrees, listing
+from thsa_cosim.report.parts.text import bound_text, degrees, listing, plus_minus
 
 NOTABLE_Z = 2.0
 #: So many changes are told one by one.
@@ -28,11 +28,21 @@ Key = tuple[str, str, str]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with its standard error (None: not known), and whether the data determine it."""
+    """A value with its standard error (None: not known), and whether the data determine it.
+
+    ``comparable``: its standard error is that of a difference, too. So it is for what is only not determined because it
+    cannot be distinguished from zero: it may well differ from what another study found.
+    """
 
     value: float
     stderr: float | None = None
     determined: bool = True
+    comparable: bool = True
+
+    @property
+    def is_nothing(self) -> bool:
+        """Whether it lies within three standard errors of zero."""
+        return self.stderr is not None and abs(self.value) < 3.0 * self.stderr
 
 
 @dataclass(frozen=True)
@@ -60,6 +70,10 @@ class Row:
     part_of: str = ""
     """The amplitude that a sine or cosine part belongs to: by itself it depends on where the angle is counted from."""
 
+    def furthest(self) -> float:
+        """Less the largest |z|: sorts the surest difference first."""
+        return -max((abs(d.z) for d in self.differences if d is not None and d.z is not None), default=0.0)
+
     @cached_property
     def differences(self) -> tuple[Difference | None, ...]:
         """Of every study from the first one."""
@@ -74,14 +88,22 @@ class Row:
 
     @property
     def change(self) -> str:
-        """What became of the quantity, for two studies: ``fell by 80 ± 3 %``; "" where that says little."""
+        """What became of the quantity, for two studies: ``fell by 80 ± 3 %``; "" where that says little.
+
+        From nothing there is no share: ``rose from 0.001 ± 0.002 to 1.820 ± 0.004 N.m/rad``.
+        """
         first, last, difference = self.values[0], self.values[-1], self.differences[-1]
-        if first is None or last is None or difference is None or len(self.values) != 2 or not first.value:
+        if first is None or last is None or difference is None or len(self.values) != 2:
             return ""
+        if first.is_nothing or first.value * last.value < 0.0:
+            verb = "rose" if difference.value > 0.0 else "fell"
+            unit = f" {self.unit}" if self.unit not in ("", "1") else ""
+            ends = (plus_minus(v.value, v.stderr) for v in (first, last))
+            return f"{verb} from {' to '.join(ends)}{unit}"
         share = abs(difference.value / first.value)
         ratio = last.value / first.value
         errors = [v.stderr / abs(first.value) for v in (last, first) if v.stderr is not None]
-        if ratio < 0.0 or len(errors) < 2:
+        if len(errors) < 2:
             return ""
         stderr = math.hypot(errors[0], ratio * errors[1])
         verb = "fell" if difference.value * first.value < 0.0 else "rose"
@@ -123,7 +145,7 @@ class Comparison:
             if not all(has):
                 where = [label for label, one in zip(self.labels, has, strict=True) if one]
                 parts.append(f"only {listing(where)} found {name}")
-        moved = [r for r in self.rows if not r.part_of and r.beyond(self.limit)]
+        moved = sorted((r for r in self.rows if not r.part_of and r.beyond(self.limit)), key=Row.furthest)
         tested = self._tested()
         changes = {r.name: f"{r.name} {r.change}" for r in moved if r.change and len(moved) <= _TOLD}
         apart = [name for name in dict.fromkeys(r.name for r in moved) if name not in changes]
@@ -218,7 +240,7 @@ def _difference(first: Estimate, other: Estimate | None) -> Difference | None:
     if other is None:
         return None
     d = other.value - first.value
-    if first.stderr is None or other.stderr is None or not (first.determined and other.determined):
+    if first.stderr is None or other.stderr is None or not (first.comparable and other.comparable):
         return Difference(d, None, None)
     together = math.hypot(first.stderr, other.stderr)
     return Difference(d, together, d / together if together > 0.0 else None)
@@ -274,9 +296,10 @@ def _of_tuning(result: Json) -> Iterator[tuple[Key, tuple[Estimate, str]]]:
 def _estimate(value: Json) -> tuple[Estimate, str]:
     stderr = value.get("stderr")
     known = float(stderr) if isinstance(stderr, int | float) and math.isfinite(stderr) else None
-    return Estimate(float(value["value"]), known, bool(value.get("identifiable", True))), str(
-        value.get("unit", "")
-    )
+    found = Estimate(float(value["value"]), known, bool(value.get("identifiable", True)))
+    ended = bound_text(value) or "end of its range" in str(value.get("reason", ""))
+    comparable = found.determined or (found.is_nothing and not ended)
+    return replace(found, comparable=comparable), str(value.get("unit", ""))
 
 
 def _settings(studies: Sequence[Study]) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -308,13 +331,29 @@ def _notes(studies: Sequence[Study], rows: Sequence[Row]) -> Iterator[str]:
             "Some studies fitted the same recordings, so their estimates are not independent: standard errors of"
             " differences, and z, are only approximate."
         )
-    unsure = [r.name for r in rows if any(v is not None and not v.determined for v in r.values)]
+    poor = [s.whole.folder.name for s in studies if _is_unexplained(s)]
+    if poor:
+        yield (
+            f"The {'model leaves' if len(poor) == 1 else 'models leave'} more than noise in {listing(poor)}: a small"
+            " difference may be the model's error. Compare two recordings of the same state to see how large that is."
+        )
+    unsure = [r.name for r in rows if _is_untested(r)]
     if unsure:
         names = ", ".join(dict.fromkeys(unsure))
         yield f"Not determined by the data of at least one study, hence no standard error of the difference: {names}."
     other = [r.name for r in rows if not r.same_unit]
     if other:
         yield f"In different units, so not subtracted: {', '.join(dict.fromkeys(other))}."
+
+
+def _is_unexplained(study: Study) -> bool:
+    return ((study.whole.result or {}).get("trust") or {}).get("verdict") == "not-explained"
+
+
+def _is_untested(row: Row) -> bool:
+    """Whether a study has a value that its data do not determine, so that a difference has no error."""
+    tested = all(d is None or d.z is not None for d in row.differences[1:])
+    return not tested and any(v is not None and not v.determined for v in row.values)
 
 
 def _recordings(study: Study) -> set[str]:

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from thsa_cosim.diagnosis.results import (
-    ChannelError,
     DiagnosisResult,
     EmpiricalLaw,
     Errors,
     Evidence,
     SeparatingExperiment,
+    StructuredError,
     Value,
 )
 from thsa_cosim.identify import ForceBalance
@@ -119,10 +119,12 @@ def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:
         samples = zip(inputs.time.tolist(), *(inputs[n].tolist() for n in inputs.names), strict=True)
         write_csv(folder / "experiment.csv", header, [_cells(sample) for sample in samples])
         files.append(folder / "experiment.csv")
-    for c in result.comparisons:
-        models = {"before": c.before, "after": c.after}
-        variants = {"measured": c.measured, **{k: s for k, s in models.items() if s is not None}}
-        files.append(write_signals(folder, c.part, c.name, variants))
+    after = {(c.role, c.recording): c.simulated for c in result.comparisons_after}
+    for c in result.comparisons_before:
+        variants = {"measured": c.measured, "before": c.simulated}
+        if (c.role, c.recording) in after:
+            variants["after"] = after[c.role, c.recording]
+        files.append(write_signals(folder, c.role, c.recording, variants))
     files += [p for p in (result.model, result.extended_fmu, result.wrapper) if p is not None]
     if (again := write_extended_scenario(result, folder)) is not None:
         files.append(again)
@@ -211,5 +213,5 @@ def _errors(errors: Errors) -> dict[str, dict[str, dict[str, float]]]:
     return {part: {name: _error(e) for name, e in channels.items()} for part, channels in errors.items()}
 
 
-def _error(error: ChannelError) -> dict[str, float]:
+def _error(error: StructuredError) -> dict[str, float]:
     return {"rmse": error.rmse, "noise": error.noise, "structure": error.structure}

@@ -1,4 +1,4 @@
-"""Friction in proportion to the load that the pair carries, its breakaway part and its growth with the load."""
+"""Friction in proportion to the load that a gear or a thread carries, and the ways in which the share can vary."""
 
 import numpy as np
 
@@ -7,33 +7,38 @@ from thsa_cosim.signals import FloatArray
 
 
 def friction(p: Values, at: Connectors) -> FloatArray:
-    """(mu + mu_S exp(-(v/v_S)^2) + mu_2 |N|) |N| sgn(v)."""
-    load = np.abs(at["N"])
-    breakaway = p["mu_S"] * np.exp(-((at["v"] / p["v_S"]) ** 2))
-    return np.asarray((p["mu"] + breakaway + p["mu_2"] * load) * load * at["s"])
+    """(mu + mu_S exp(-(|v|/v_S)^n_S) + mu_v |v| + mu_2 |N|) |N| sgn(v) + mu_A N sgn(v) + mu_D N sgn(v)^2."""
+    load, speed, s = np.abs(at["N"]), np.abs(at["v"]), at["s"]
+    share = p["mu"] + p["mu_S"] * np.exp(-((speed / p["v_S"]) ** p["n_S"])) + p["mu_v"] * speed
+    return np.asarray(
+        ((share + p["mu_2"] * load) * load + p["mu_A"] * at["N"]) * s + p["mu_D"] * at["N"] * s**2
+    )
 
 
 def _variant(*parameters: EffectParameter, beside: bool) -> Variant:
     return Variant("FrictionEffect", "LoadDependentFriction", parameters, law=friction, beside=beside)
 
 
-MU = EffectParameter("mu", "1", 0.01, "friction per load", lower=0.0, upper=0.9)
+def _share(name: str, description: str, lower: float) -> EffectParameter:
+    return EffectParameter(name, "1", 0.01, description, lower=lower, upper=0.9)
+
+
+MU = _share("mu", "friction per load", 0.0)
 GROWTH = EffectParameter("mu_2", "1/F", 0.01, "growth of the friction per load with the load", lower=0.0)
 
 EFFECT = Effect(
     name="load-dependent-friction",
     title="Friction in proportion to the load that the pair carries",
-    physics="F = (mu + mu_S exp(-(v/v_S)^2) + mu_2 |N|) |N| sgn(v)",
-    source="Coulomb; Lemor, SNAME 1996 (roller screws); Duclusaud et al., ICRA 2025 (gears, models m3 to m6)",
+    physics="F = (mu + mu_S exp(-(|v|/v_S)^n_S) + mu_v |v| + mu_2 |N|) |N| sgn(v) + mu_A N sgn(v) + mu_D N sgn(v)^2",
+    source="Coulomb; Lemor, SNAME 1996 (roller screws); Vahid-Araghi and Golnaraghi, Friction-Induced Vibration in"
+    " Lead Screw Drives (2011); Duclusaud et al., ICRA 2025 (gears, models m3 to m6)",
     signature="current grows with the load beyond the declared lossless transmission",
     variants=(
         _variant(MU, beside=False),
         # Where losses grow faster than the load, a share of the load alone may explain less than what is no friction.
         _variant(MU, GROWTH, beside=False),
         _variant(
-            EffectParameter(
-                "mu_S", "1", 0.01, "breakaway part of the friction per load", lower=0.0, upper=0.9
-            ),
+            _share("mu_S", "breakaway part of the friction per load", 0.0),
             EffectParameter(
                 "v_S",
                 "V",
@@ -44,8 +49,15 @@ EFFECT = Effect(
                 upper=0.5,
                 starts=(0.03, 0.1, 0.3),
             ),
+            EffectParameter("n_S", "1", 1.5, "exponent", role="shape", lower=0.5, upper=3.0, starts=(1.5,)),
+            beside=True,
+        ),
+        _variant(
+            EffectParameter("mu_v", "1/V", 0.01, "growth of the friction per load with the speed"),
             beside=True,
         ),
         _variant(GROWTH, beside=True),
+        _variant(_share("mu_D", "half the difference of driving and driven", -0.9), beside=True),
+        _variant(_share("mu_A", "half the difference of positive and negative load", -0.9), beside=True),
     ),
 )

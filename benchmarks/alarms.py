@@ -1,6 +1,6 @@
 """How often the alarm of ``thsa-cosim compare --watch`` is false, and how soon it is right.
 
-``python benchmarks/alarms.py [--units 2000] [--seed 1]``: units with a number of quantities, recorded once a week for a
+``python benchmarks/alarms.py [--units 300] [--seed 1]``: units with a number of quantities, recorded once a week for a
 year, beginning without a history; the estimates scatter by more than their standard errors say, by an amount that the
 alarm does not know. Counted: false alarms per unit and year (the limit promises 1 at most), and the weeks until a
 quantity that jumps or drifts is reported.
@@ -20,7 +20,7 @@ def year(values: np.ndarray) -> np.ndarray:
     for week in range(FEWEST - 1, weeks):
         jump, drift = limits(week + 1, quantities)
         for own in values[:, : week + 1]:
-            j, d = jump_of(own)[0] or 0.0, drift_of(own)[0] or 0.0
+            j, d = jump_of(own) or 0.0, drift_of(own)[0] or 0.0
             raised[week] += abs(j) > jump or abs(d) > drift
     return raised
 
@@ -35,7 +35,8 @@ def main() -> None:
     for quantities in (1, 4, 12):
         for name, draw in (
             ("normal", rng.standard_normal),
-            ("Student's t, 5 degrees of freedom", lambda size: rng.standard_t(5, size) / np.sqrt(5 / 3)),
+            ("Student's t, 5 degrees of freedom", lambda size: rng.standard_t(5, size)),
+            ("Student's t, 3 degrees of freedom", lambda size: rng.standard_t(3, size)),
         ):
             counts = [year(draw((quantities, RECORDINGS))).sum() for _ in range(given.units)]
             error = np.std(counts, ddof=1) / np.sqrt(given.units)
@@ -53,7 +54,7 @@ def main() -> None:
                     w
                     for w in range(RECORDINGS)
                     if (
-                        abs(jump_of(values[0, : RECORDINGS + w + 1])[0] or 0.0)
+                        abs(jump_of(values[0, : RECORDINGS + w + 1]) or 0.0)
                         > limits(RECORDINGS + w + 1, 4)[0]
                     )
                     or (

@@ -23,18 +23,27 @@ model RedundantActuator "THSA with two motor lanes, active and standby, and two 
   parameter THSA.Units.Time t_sensor(min=-1, max=1e9) = 1e9 "Failure: time from which the output's velocity sensor reads 0";
   parameter THSA.Units.Torque T_jam(min=0, max=1e6) = 3000 "Torque of a jam or of the lock at the screw";
   THSA.Redundancy.Monitor monitor "Active and standby";
-  THSA.Redundancy.Lane laneA "Lane A, active";
+  THSA.Redundancy.Lane laneA(tau_f=motorEffect.F) "Lane A, active";
   THSA.Redundancy.Lane laneB "Lane B, standby";
   THSA.Redundancy.Differential differential "Differential";
-  THSA.Gearbox gearbox(tau_f=if time >= t_jam or monitor.locked then T_jam*gearbox.friction.s else 0) "Gearbox";
+  THSA.Gearbox gearbox(tau_f=gearboxEffect.F + (if time >= t_jam or monitor.locked then T_jam*gearbox.friction.s else 0)) "Gearbox";
   THSA.NoBack noBack "No-back device";
   THSA.Redundancy.LoadPath primary "Primary load path: roller screw and nut";
   THSA.Redundancy.LoadPath secondary(k_s=1.5e8, d_s=2.5e5, gap=1e-3) "Secondary load path: tie rod and its nut";
-  THSA.Nut nut(F_f=if primary.broken then -nut.friction.F_f else 0) "Nut; a broken path takes its friction along";
+  THSA.Nut nut(F_f=if primary.broken then -nut.friction.F_f else screwEffect.F) "Nut; a broken path takes its friction along";
   THSA.Stabilizer stabilizer "Stabilizer";
   THSA.VelocitySensor sensor "Velocity sensor";
   replaceable THSA.Thermal.GivenTemperatures temperatures constrainedby THSA.Interfaces.PartTemperatures
     "Slot: temperatures of the parts";
+  replaceable THSA.Effects.NoFriction motorEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
+    constrainedby THSA.Interfaces.FrictionEffect
+    "Slot: friction and torques at motor A";
+  replaceable THSA.Effects.NoFriction gearboxEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
+    constrainedby THSA.Interfaces.FrictionEffect
+    "Slot: friction and torques at the gearbox's output shaft";
+  replaceable THSA.Effects.NoFriction screwEffect(v(unit="m/s"), z(unit="m"), N(unit="N"), F(unit="N"))
+    constrainedby THSA.Interfaces.FrictionEffect
+    "Slot: friction between screw and nut";
   THSA.Units.Power P_loss "All that becomes heat";
   THSA.Units.Energy E_stored "Energy of masses, windings and contacts";
   THSA.Units.Energy E_net(nominal=10) "Energy that has come in and has neither gone out nor become heat";
@@ -78,6 +87,18 @@ equation
   connect(temperatures.winding, laneB.T_w);
   connect(temperatures.gearbox, gearbox.T);
   connect(temperatures.screw, nut.T);
+  motorEffect.v = laneA.motor.w_m;
+  motorEffect.s = laneA.motor.friction.s;
+  motorEffect.z = laneA.motor.phi;
+  motorEffect.N = laneA.motor.tau_e;
+  gearboxEffect.v = gearbox.w_g;
+  gearboxEffect.s = gearbox.friction.s;
+  gearboxEffect.z = gearbox.flange_b.phi;
+  gearboxEffect.N = noBack.tau_s;
+  screwEffect.v = nut.v;
+  screwEffect.s = nut.friction.s;
+  screwEffect.z = stabilizer.x;
+  screwEffect.N = primary.F_s + secondary.F_s;
   v = if time >= t_sensor then 0 else sensor.y;
   x = stabilizer.x;
   w_A = laneA.w_s;

@@ -155,11 +155,12 @@ def test_wrong_lengths_are_refused(tmp_path: Path) -> None:
 STUDY = """
     import json, sys
     from pathlib import Path
+    from time import sleep
     import numpy as np
     from thsa_cosim.batch import Experiment, Job, Journal, JournalRow, LocalRunner
     from thsa_cosim.signals import Signals
 
-    fmu, folder = Path(sys.argv[1]), Path(sys.argv[2])
+    fmu, folder, enough = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
     time = np.linspace(0.0, 1.0, 101)
     names, bounds = ("tau", "k"), np.array([[0.01, 0.5], [0.5, 4.0]])
 
@@ -170,7 +171,7 @@ STUDY = """
         inputs = Signals(time, {"u": np.ones_like(time)})
         experiment = Experiment("step", fmu, inputs, ("y",), time, reduce=reduce)
         random = np.random.default_rng(7)
-        simulated = 0
+        simulated = written = 0
         with (
             LocalRunner([experiment], workers=2, backend="python") as runner,
             Journal.open(folder / "evaluations.csv", names, ("y",)) as journal,
@@ -190,12 +191,16 @@ STUDY = """
                 jobs = [Job("step", dict(zip(names, vectors[i].tolist())) | {"fault": fault[i]}) for i in todo]
 
                 def write(position, outcome):
+                    global written
                     i = todo[position]
                     costs[i] = outcome.reduced[0] if outcome.ok else np.inf
                     journal.append(
                         [JournalRow("all", generation, tuple(vectors[i].tolist()), float(costs[i]),
                                     (float(costs[i]),), outcome.status, outcome.reason)]
                     )
+                    written += 1
+                    if written == enough:
+                        sleep(600.0)  # to be killed here at the latest, however slow the machine is
 
                 runner.run(jobs, write)
                 simulated += len(jobs)
@@ -223,10 +228,10 @@ def test_a_study_killed_ten_times_ends_like_the_undisturbed_one(tmp_path: Path) 
     environment = os.environ | {"TMPDIR": str(temporary)}
     fmu = build.lag2()
 
-    def start(folder: Path) -> "subprocess.Popen[str]":
+    def start(folder: Path, enough: int = 1000) -> "subprocess.Popen[str]":
         folder.mkdir(exist_ok=True)
         return subprocess.Popen(
-            [sys.executable, str(script), str(fmu), str(folder)],
+            [sys.executable, str(script), str(fmu), str(folder), str(enough)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -244,10 +249,10 @@ def test_a_study_killed_ten_times_ends_like_the_undisturbed_one(tmp_path: Path) 
     journal = disturbed / "evaluations.csv"
     kills = 0
     while kills < 10:
-        process = start(disturbed)
-        size = journal.stat().st_size if journal.exists() else 0
         # Some kills come before the first row, most while rows are being written.
         wanted = seed.choice((0, 1, 1, 2, 3)) if kills else 0
+        size = journal.stat().st_size if journal.exists() else 0
+        process = start(disturbed, wanted + 2)
         until = time.monotonic() + 60.0
         while wanted and process.poll() is None and time.monotonic() < until:
             grown = journal.read_bytes()[size:] if journal.exists() else b""
@@ -275,7 +280,7 @@ def test_a_study_killed_ten_times_ends_like_the_undisturbed_one(tmp_path: Path) 
     first, second = (t.sort_values(columns).reset_index(drop=True) for t in tables)
     assert first.drop(columns="reason").equals(second.drop(columns="reason"))
     assert (first["status"] == "crash").any()
-    until = time.monotonic() + 10.0
+    until = time.monotonic() + 60.0
     while list(temporary.iterdir()) and time.monotonic() < until:
         time.sleep(0.05)
     assert list(temporary.iterdir()) == []

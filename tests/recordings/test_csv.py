@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thsa_cosim.errors import InputError, RecordingError, UnitError
-from thsa_cosim.recordings import Column, TimeAxis, column_names, read_recording
+from thsa_cosim.recordings import Column, TimeAxis, column_names, load_columns, read_recording
 
 TIME = TimeAxis("t", "s")
 COLUMNS = {"v": Column("v", "mm/s")}
@@ -302,3 +302,50 @@ def test_a_point_where_the_comma_is_decimal_is_no_guess(tmp_path):
     file.write_text("\n".join(["t [s];F [N]", *rows]))
     with pytest.raises(RecordingError, match=r"'F' is not numeric: '1\.234' on line 14"):
         read_recording(file, {"F": Column("F")}, time=TimeAxis("t"), units={"F": "N"})
+
+
+TABLE = "time_s,v_m_s,i_A\n" + "".join(
+    f"{k * 1e-3:.3f},{0.1 * k:.2f},{-0.5 + 0.01 * k:.2f}\n" for k in range(60)
+)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        TABLE.encode() + b"\0" * 300,  # the power went
+        TABLE.encode("utf-16-le"),  # without its mark
+        TABLE.replace("-", "\u2212").encode(),
+        (TABLE + "End of data; 60 samples\n").encode(),
+        (TABLE + "0.0").encode(),  # a line that was cut off
+        "".join(line + ("\r\n", "\n", "\r")[k % 3] for k, line in enumerate(TABLE.splitlines())).encode(),
+    ],
+    ids=["zeros", "utf-16", "minus", "words", "cut", "line ends"],
+)
+def test_what_surrounds_a_table_does_not_change_it(tmp_path, content):
+    file = tmp_path / "run.csv"
+    file.write_bytes(content)
+    found = load_columns(file)
+    assert found["v_m_s"].values.tolist() == [float(f"{0.1 * k:.2f}") for k in range(60)]
+    assert found["i_A"].values.tolist() == [float(f"{-0.5 + 0.01 * k:.2f}") for k in range(60)]
+
+
+def test_a_second_header_is_refused_with_its_line(tmp_path):
+    file = tmp_path / "run.csv"
+    file.write_text(TABLE + TABLE)
+    with pytest.raises(RecordingError, match="line 62 holds the header again"):
+        load_columns(file)
+
+
+def test_an_angle_that_wraps_is_unwrapped_by_consent(tmp_path):
+    file = tmp_path / "run.csv"
+    angle = np.arange(400) * 3.0
+    rows = "".join(f"{k * 1e-3:.3f},{a:.1f}\n" for k, a in enumerate(np.mod(angle, 360.0)))
+    file.write_text("time_s,phi_deg\n" + rows)
+    time = TimeAxis("time_s", "s")
+    plain = read_recording(file, {"phi": Column("phi_deg", "deg")}, time=time, units={"phi": "rad"})
+    found = read_recording(
+        file, {"phi": Column("phi_deg", "deg", unwrap=360.0)}, time=time, units={"phi": "rad"}
+    )
+    assert np.ptp(plain.signals["phi"]) < 2.0 * np.pi
+    np.testing.assert_allclose(found.signals["phi"], np.radians(angle), atol=1e-9)
+    assert found.repairs == ("phi: unwrapped 3 times by 360 of the file's numbers",)

@@ -1,5 +1,6 @@
 """What a person sees on a study's page, in headless Chromium: plots, tables, colours, print, hostile names."""
 
+import json
 import re
 import shutil
 from collections.abc import Callable, Iterator
@@ -10,7 +11,7 @@ import pytest
 import report_studies as studies
 
 from thsa_cosim.batch import Journal
-from thsa_cosim.report.page import write_page
+from thsa_cosim.report.page import follow, write_page
 from thsa_cosim.study import claim_folder
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -138,8 +139,8 @@ def test_every_plot_is_drawn_with_units_on_its_axes_and_nothing_complains(
     identified: Any, tuned: Any
 ) -> None:
     expected = (
-        {"laws", "fit-run_-30", "fit-run_25", "convergence"},
-        {"response-T_amb_-30_degC", "surface", "pareto", "convergence"},
+        {"laws", "fit-run_-30", "fit-run_25", "convergence", "costs", "coordinates-0", "coordinates-1"},
+        {"response-T_amb_-30_degC", "surface", "pareto", "convergence", "costs", "coordinates-0"},
     )
     for page, names in zip((identified, tuned), expected, strict=True):
         found = plots(page)
@@ -150,7 +151,7 @@ def test_every_plot_is_drawn_with_units_on_its_axes_and_nothing_complains(
             assert box["width"] > 800, name
             assert box["height"] > 250, name
             titles = axis_titles(plot)
-            assert len(titles) > 1, name
+            assert len(titles) > (-1 if name.startswith("coordinates") else 1), name
             assert all(re.search(r"\[.+\]$", title) for title in titles), (name, titles)
         assert page.troubles == []
 
@@ -246,7 +247,8 @@ def test_single_wrong_sample_of_thousands_is_in_the_plot(identified: Any) -> Non
 
 
 def test_worst_recording_is_open_and_the_others_are_folded(identified: Any) -> None:
-    assert identified.folds == {"run_-30 (fitted, −30 °C)": None, "run_25 (fitted, 25 °C)": ""}
+    folds = {title: state for title, state in identified.folds.items() if title.startswith("run")}
+    assert folds == {"run_-30 (fitted, −30 °C)": None, "run_25 (fitted, 25 °C)": ""}
 
 
 def test_click_on_a_heading_sorts_by_number_and_again_the_other_way(tuned: Any, identified: Any) -> None:
@@ -298,7 +300,10 @@ def test_hostile_names_are_shown_as_they_are_written(show: Show, tmp_path: Path)
     assert page.inner_text("h1") == HOSTILE
     assert cells(table_of(page, "Errors by recording and signal"), "signal") == [HOSTILE] * 2
     for name, plot in plots(page).items():
-        if name != "convergence":
+        if name.startswith("coordinates"):
+            ticks = plot.eval_on_selector_all(".xtick text", "all => all.map(t => t.textContent)")
+            assert any(HOSTILE in text.replace("% {", "%{") for text in ticks), name
+        elif name not in ("convergence", "costs"):
             shown = "".join(axis_titles(plot)).replace("% {", "%{")
             assert HOSTILE in shown, name
     assert not page.query_selector_all("img, b, svg image[href=x]")
@@ -379,7 +384,7 @@ def test_printing_opens_folds_and_leaves_the_page_as_it_was(show: Show, tmp_path
     assert (printed["folded"], printed["empty"]) == (0, 0)
     assert printed["widest"] < 210 / 25.4 * 96  # A4
     assert contrast(printed["ink"], "rgb(255, 255, 255)") > 7.0
-    assert len(page.query_selector_all("details:not([open])")) == 1
+    assert len(page.query_selector_all("details:not([open])")) == 2
     assert colours(page) == before
     assert page.query_selector(".main-svg").bounding_box()["width"] > 1000
 
@@ -454,3 +459,38 @@ def test_running_study_shows_how_far_it_is(show: Show, tmp_path: Path) -> None:
     assert cells(table_of(page, "Failed evaluations by reason"), "evaluations") == ["4"]
     assert plots(page)["convergence"].query_selector_all(".trace")
     assert page.troubles == []
+
+
+def test_live_page_follows_a_study_to_its_end(show: Show, tmp_path: Path) -> None:
+    """While the study runs the browser loads the page anew; the last page does not, and says what came out."""
+    names, study = ["R_s", "psi_pm"], tmp_path / "study"
+    labels = ["-30 degC"]
+    about = studies.about(parameters=dict.fromkeys(names, "1"), samples=dict.fromkeys(labels, 10))
+    claim_folder(study, studies.identity("identify"), about)
+    studies.write_journal(study, labels, names, ["i_q"], generations=2)
+    journal = Journal.open(study / "journal.csv", names, ["i_q"])
+    texts: list[str] = []
+
+    def finish(_: float) -> None:
+        texts.append((study / "report.html").read_text())
+        journal.close()
+        result = studies.identify_result()
+        (study / "result.json").write_text(json.dumps(result))
+
+    pages = list(follow(study, sleep=finish))
+    assert len(texts) == 1
+    assert pages == [study / "report.html"] * 2
+    assert '<meta http-equiv="refresh" content="5">' in texts[0]
+    (tmp_path / "running.html").write_text(texts[0].replace('http-equiv="refresh"', "", 1))
+    running = show(tmp_path / "running.html", viewport={"width": 390, "height": 900})
+    best = table_of(running, "Best vector of each search so far")
+    assert cells(best, "evaluations") == ["12"]
+    assert cells(best, "failed") == ["2"]
+    drawn = plots(running)
+    assert {"costs", "coordinates-0"} <= set(drawn)
+    labelled = drawn["coordinates-0"].eval_on_selector_all(
+        ".xtick text", "all => all.map(t => t.textContent)"
+    )
+    assert [text.split("0")[0][:3] for text in labelled] == ["R_s", "psi", "cos"]
+    assert running.troubles == []
+    assert "refresh" not in (study / "report.html").read_text().split("</title>")[0]

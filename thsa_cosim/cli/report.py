@@ -11,11 +11,17 @@ from thsa_cosim.cli.options import PATH
 @click.argument("folder", metavar="DIR", type=PATH)
 @click.option("-o", "--output", type=PATH, default=None, help="The file to write; default DIR/report.html.")
 @click.option("--open", "show", is_flag=True, help="Show the page in the browser.")
-def report(folder: Path, output: Path | None, show: bool) -> None:
+@click.option(
+    "--live",
+    is_flag=True,
+    help="Write the page every 5 s while the study runs; the browser loads it by itself.",
+)
+def report(folder: Path, output: Path | None, show: bool, live: bool) -> None:
     """Write the HTML page of the study in DIR, finished or running: results, plots and provenance in one file."""
-    from thsa_cosim.report.page import write_page
+    from thsa_cosim.report.page import follow, write_page
 
-    page = write_page(folder, output)
-    click.echo(str(page))
-    if show:
-        click.launch(page.resolve().as_uri())
+    for number, page in enumerate(follow(folder, output) if live else (write_page(folder, output),)):
+        if number == 0:
+            click.echo(str(page))
+            if show:
+                click.launch(page.resolve().as_uri())

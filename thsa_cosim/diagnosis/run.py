@@ -28,6 +28,7 @@ from thsa_cosim.diagnosis.explaining.dependence import dependence
 from thsa_cosim.diagnosis.explaining.empirical import LawSearch, law_of
 from thsa_cosim.diagnosis.explaining.evidence import evidence
 from thsa_cosim.diagnosis.explaining.experiment import separating_experiment
+from thsa_cosim.diagnosis.explaining.slips import with_slips
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -227,7 +228,7 @@ class _Closing:
             evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if changed else 0),
             failures=counts,
             notes=tuple(notes),
-            data=self.scenario.data,
+            data=with_slips(scenario.data, after, scenario.file_units),
             asked=scenario.table.model_dump(mode="json", by_alias=True, exclude_unset=True),
         )
 

@@ -10,6 +10,7 @@ import numpy as np
 from thsa_cosim import __version__
 from thsa_cosim.batch import Journal
 from thsa_cosim.errors import InputError, StudyError
+from thsa_cosim.identify.expected import expected_values
 from thsa_cosim.identify.force import force_balance
 from thsa_cosim.identify.over_temperature import all_laws, values_at
 from thsa_cosim.identify.parameter_set import parameter_set
@@ -24,7 +25,7 @@ from thsa_cosim.identify.problem import (
 )
 from thsa_cosim.identify.results import ForceBalance, IdentifyResult, LawResult, PointResult
 from thsa_cosim.identify.silent import note_on, silent_parameters
-from thsa_cosim.inspection import Finding, Inspection, Residual, judge, misfits
+from thsa_cosim.inspection import Finding, Inspection, Residual, hidden_gains, judge, misfits
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario
 from thsa_cosim.search import EvolutionSettings, Generation
@@ -265,7 +266,10 @@ class _Search:
             settings={**scenario.search.model_dump(), "error": scenario.cost.error},
             force=force,
             data=Inspection.of((*scenario.data.findings, *slips), scenario.data.repairs),
-            trust=judge(self._residuals(), (*map(_reason, slips), *self._bounds(), *self._coupled())),
+            trust=judge(
+                self._residuals(),
+                (*_reasons(slips), *self._bounds(), *self._coupled()),
+            ),
             coupling=self._coupling,
         )
 
@@ -289,7 +293,19 @@ class _Search:
             for k in sorted(self._found)
             for f in misfits(self._point_residuals(k), self._scenario.file_units)
         ]
-        return [f for f in found if (f.recording, f.channel, f.kind) not in known]
+        found = [f for f in found if (f.recording, f.channel, f.kind) not in known]
+        doubted = {f.channel for f in found}
+        return found + [f for f in self._hidden() if f.channel not in doubted]
+
+    def _hidden(self) -> list[Finding]:
+        """Gains of sensors that the fit cannot see, where the parameters differ from the drawing in that way."""
+        spec = self._scenario
+        found: list[Finding] = []
+        for k, search in sorted(self._found.items()):
+            if search.result is not None and search.jacobian is not None:
+                own = expected_values(search.result, self._points[k].space, spec.laws, spec.fmu, spec.zeroed)
+                found += hidden_gains(self._point_residuals(k), own)
+        return found
 
     def _coupled(self) -> list[str]:
         return [] if self._coupling is None or not self._coupling.reason else [self._coupling.reason]
@@ -344,8 +360,8 @@ class _Search:
         return comparisons
 
 
-def _reason(finding: Finding) -> str:
-    return f"{finding.recording}: {finding.text} ({finding.kind})"
+def _reasons(findings: Sequence[Finding]) -> list[str]:
+    return [f"{f.recording}: {f.text} ({f.kind})" for f in findings if f.severity != "note"]
 
 
 def _held_out_cases(scenario: Scenario) -> list[tuple[Case, Recording]]:

@@ -4,6 +4,7 @@ Only what must hold on any machine is used: a response cannot come before its co
 the same speed as measured agree in the end; a speed is the derivative of its position.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -34,6 +35,8 @@ SLIPS: dict[str, float] = {
 """What is written for what is meant, and the factor on the numbers."""
 _GEARS = frozenset(n for n, f in SLIPS.items() if f in (1e3, 1e-3, 100.0, 0.01, 60.0, 1.0 / 60.0))
 """Factors that a gear may have just as well, between two angles."""
+_TIMES = {1e-3: "ms", 1e-6: "us", 60.0: "min", 1e3: "s"}
+"""A speed in derivatives of its position, and the unit of time that makes them one; the last: time was read in ms."""
 _NEAR = 0.02
 """Relative distance at which a factor is taken for a slip."""
 _ONSET = 6.0
@@ -49,17 +52,30 @@ def across_findings(channels: Sequence[Channel]) -> Iterator[Finding]:
     measured = [c for c in channels if c.role != "input" and not c.silent and _moves(c)]
     for command in commands:
         yield from _early_response(command, measured)
+    pairs: list[list[Finding]] = []
     named: set[str] = set()
     for command in commands:
         for channel in measured:
             if _one_dimension(command, channel):
-                for finding in _slip(command, channel):
-                    named |= {channel.name, command.name}
-                    yield finding
+                pairs.append(list(_slip(command, channel)))
+                named |= {name for f in pairs[-1] for name in (channel.name, command.name)}
     for position in channels:
         for speed in channels:
             if position is not speed and speed.name not in named and _is_derivative(position, speed):
-                yield from _derivative(position, speed)
+                pairs += [list(_derivative(position, speed))]
+    yield from _blamed([pair for pair in pairs if pair])
+
+
+def _blamed(pairs: Sequence[Sequence[Finding]]) -> Iterator[Finding]:
+    """The findings on pairs of channels, either of which may be wrong: one that is in several of them is."""
+    often = Counter(name for pair in pairs for name in {f.channel for f in pair})
+    told: set[tuple[str, str]] = set()
+    for pair in pairs:
+        most = max(often[f.channel] for f in pair)
+        for finding in pair:
+            if often[finding.channel] == most and (finding.channel, finding.kind) not in told:
+                told.add((finding.channel, finding.kind))
+                yield finding
 
 
 def slip(factor: float, near: float = _NEAR) -> str | None:
@@ -227,6 +243,13 @@ def _derivative(position: Channel, speed: Channel) -> Iterator[Finding]:
     if abs(ratio - 1.0) < _SAME_SPEED:
         return
     yield from _named(speed, ratio, f"the derivative of {position.name}", position)
+    for factor, unit in _TIMES.items():
+        if abs(ratio / factor - 1.0) < _NEAR:
+            text = f"{speed.name} is {ratio:.4g} times the derivative of {position.name}: time seems to be in {unit}"
+            remedy = f'[recordings.time]\nunit = "{unit}"'
+            yield Finding(
+                speed.recording, "time", "unit", "error", f"{text}, unless one of them is wrong", (), remedy
+            )
 
 
 _SAME_SPEED = 0.05

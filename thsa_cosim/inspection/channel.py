@@ -141,13 +141,15 @@ class Channel:
         if not self.silent:
             fresh = self.fresh_index
             mask[fresh] = find_spikes(self.plain[fresh], self.noise)
-        if self.commanded is not None and self.commanded.size and mask.any():
-            since = (
-                self.time
-                - self.commanded[np.maximum(np.searchsorted(self.commanded, self.time, "right") - 1, 0)]
-            )
-            mask &= ~((since >= 0.0) & (since < _ANSWER * self.step))
-        return mask
+        return mask & ~self.answers if mask.any() else mask
+
+    @cached_property
+    def answers(self) -> Mask:
+        """Which samples come right after a jump of a command."""
+        if self.commanded is None or not self.commanded.size:
+            return np.zeros(self.values.shape, dtype=np.bool_)
+        last = self.commanded[np.maximum(np.searchsorted(self.commanded, self.time, "right") - 1, 0)]
+        return np.asarray((self.time >= last) & (self.time - last < _ANSWER * self.step))
 
     @cached_property
     def clean(self) -> FloatArray:

@@ -12,8 +12,9 @@ from thsa_cosim.errors import UnitError
 from thsa_cosim.inspection.channel import Channel
 from thsa_cosim.inspection.finding import Finding, Inspection
 from thsa_cosim.inspection.recording import inspect_channels
+from thsa_cosim.inspection.time_axis import time_findings
 from thsa_cosim.recordings import load_columns
-from thsa_cosim.recordings.columns import FoundColumn, find_columns, time_column
+from thsa_cosim.recordings.columns import TIME_NAMES, FoundColumn, find_columns, time_column
 from thsa_cosim.recordings.table import RawColumn
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import convert
@@ -51,8 +52,7 @@ def inspect_file(path: Path) -> FileReport:
     if time is not None or any(c.own_time for c in columns):
         findings += _of_channels(path, raw, columns, time)
     else:
-        text = "no column increases as a time axis does; name it, or repair its stamps"
-        findings.append(Finding(path.stem, "time", "repeated-stamps", "warning", text))
+        findings += _no_time(path, raw, columns)
     return FileReport(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
@@ -60,6 +60,18 @@ def inspect_file(path: Path) -> FileReport:
         time=None if time is None else time.name,
         data=Inspection.of(findings),
     )
+
+
+def _no_time(path: Path, raw: Mapping[str, RawColumn], columns: tuple[FoundColumn, ...]) -> list[Finding]:
+    """What keeps a column that is called time from being one."""
+    named = next((c for c in columns if TIME_NAMES & {word.lower() for word in c.words}), None)
+    found = []
+    if named is not None:
+        found = list(time_findings(path.stem, _seconds(raw[named.name].values, named.unit)))
+    if any(f.kind == "repeated-stamps" for f in found):
+        return found
+    text = "no column increases as a time axis does; name it, or repair its stamps"
+    return [Finding(path.stem, "time", "repeated-stamps", "warning", text)]
 
 
 def _of_channels(

@@ -7,15 +7,15 @@ tested again. A model that lacks something leaves structure that no slip explain
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from thsa_cosim.errors import UnitError
 from thsa_cosim.inspection.across import SLIPS, slip
 from thsa_cosim.inspection.finding import Finding, Severity
+from thsa_cosim.inspection.remainder import Column, Remainder, Slip, orthonormal
 from thsa_cosim.inspection.trust import Residual
-from thsa_cosim.recordings import noise_estimate
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.units import conversion
 
@@ -35,128 +35,14 @@ _SMALL = 0.3
 """Noise below which the size of an offset, drift or step is not worth a word."""
 _SHORT = 0.3
 """Sampling steps below which a delay is the sampling's own."""
+_UNEVEN, _HOP = 1.15, 0.3
+"""Mean step around a moment in usual ones, share of its range that a signal goes in one step: coarse sampling."""
 _LAGS = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 32.0, 50.0, 80.0)
 _STEPS = 24
 _MOST_SLOPES = 20
 """Parameters up to which a delay is settled together with them: it takes twenty factorisations."""
 _MOST = 3
 _LEAST = 200
-
-
-_Column = Sequence[tuple[slice, FloatArray]]
-"""What a slip leaves: values by the rows of one channel; 0 in all others."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Slip:
-    """One explanation: ``column`` is what it leaves, ``size`` in its own unit (s, the signal's unit, a factor).
-
-    ``gain``: how far it lowers the sum of squares; ``weight``: what of that counts beside others.
-    """
-
-    kind: str
-    channel: str
-    column: _Column
-    size: float
-    gain: float
-    at: float = 0.0
-    weight: float = 1.0
-
-
-class _Rest:
-    """The residuals (N,) of one recording over all of its channels, less what parameters and found slips explain."""
-
-    def __init__(
-        self,
-        own: Sequence[Residual],
-        stacked: FloatArray,
-        slopes: FloatArray,
-        basis: FloatArray,
-        first: int,
-    ) -> None:
-        self.own = own
-        self._stacked, self._slopes = stacked, slopes
-        self.rows = [slice(first + sum(r.values.size for r in own[:k]), 0) for k in range(len(own))]
-        self.rows = [slice(s.start, s.start + r.values.size) for s, r in zip(self.rows, own, strict=True)]
-        self._basis = basis
-        self.values = self.without(stacked)
-        self.floors = [_floor(r.values) for r in own]
-
-    def without(self, column: FloatArray) -> FloatArray:
-        """``column`` (N,) less its projection on what is explained already."""
-        return np.asarray(column - self._basis @ (self._basis.T @ column))
-
-    def gain(self, column: _Column) -> tuple[float, float]:
-        """Best coefficient of ``column`` and how far it lowers the sum of squares."""
-        product, power, free = self._products(column)
-        if free <= 1e-8 * power or free <= 0.0:
-            return 0.0, 0.0  # the parameters do the same
-        return product / free, product * product / free
-
-    def drop(self, column: _Column) -> float:
-        """How far ``column`` as it is lowers the sum of squares."""
-        product, _, free = self._products(column)
-        return 2.0 * product - free
-
-    def _products(self, column: _Column) -> tuple[float, float, float]:
-        """Of ``column``: product with the residuals, sum of squares, and that of what the parameters cannot make.
-
-        The residuals are orthogonal to the orthonormal basis: only the rows of the column count.
-        """
-        product, power, made = 0.0, 0.0, np.zeros(self._basis.shape[1])
-        for rows, values in column:
-            product += float(values @ self.values[rows])
-            power += float(values @ values)
-            made += values @ self._basis[rows]
-        return product, power, power - float(made @ made)
-
-    def best(self, rows: slice, shapes: FloatArray) -> FloatArray:
-        """Coefficients (m,) with which ``shapes`` (n, m), 0 outside ``rows``, lower the sum of squares most."""
-        made = shapes.T @ self._basis[rows]
-        gram = shapes.T @ shapes - made @ made.T
-        size = np.sqrt(np.einsum("ij,ij->j", shapes, shapes))
-        scaled = np.linalg.lstsq(
-            gram / np.outer(size, size), shapes.T @ self.values[rows] / size, rcond=1e-10
-        )
-        return np.asarray(scaled[0] / size)
-
-    def whole(self, column: _Column) -> FloatArray:
-        """``column`` (N,) over all recordings and channels."""
-        found = np.zeros(self.values.size)
-        for rows, values in column:
-            found[rows] = values
-        return found
-
-    def beside_late(self, column: _Column, which: Sequence[int], by: float) -> float:
-        """Sum of squares after ``column`` where what parameters do to the channels ``which`` is late ``by`` s, too."""
-        slopes = self._slopes.copy()
-        for k in which:
-            rows, time = self.rows[k], self.own[k].time
-            for i in range(slopes.shape[1]):
-                slopes[rows, i] = np.interp(time - by, time, slopes[rows, i])
-        basis, left = _orthonormal(slopes), self._stacked - self.whole(column)
-        left = left - basis @ (basis.T @ left)
-        return float(left @ left)
-
-    def take(self, column: _Column) -> None:
-        """Take ``column`` into what is explained."""
-        free = self.without(self.whole(column))
-        free /= np.linalg.norm(free)
-        self.values = self.values - free * float(free @ self.values)
-        self._basis = np.column_stack((self._basis, free))
-
-    @property
-    def chance(self) -> float:
-        """By how much the sum of squares of white noise may be larger than expected: three standard deviations."""
-        counts = (f * f * r.values.size for f, r in zip(self.floors, self.own, strict=True))
-        return 3.0 * float(np.sqrt(2.0 * sum(counts)))
-
-    @property
-    def excess(self) -> float:
-        """What is left beyond white noise, as a sum of squares over this recording."""
-        parts = (float(self.values[s] @ self.values[s]) for s in self.rows)
-        counts = (f * r.values.size for f, r in zip(self.floors, self.own, strict=True))
-        return max(sum(parts) - sum(counts), 0.0)
 
 
 def misfits(
@@ -171,12 +57,12 @@ def misfits(
         return []
     stacked = np.concatenate([r.values for r in residuals])
     slopes = np.concatenate([r.slopes for r in residuals])
-    basis = _orthonormal(slopes)
+    basis = orthonormal(slopes)
     found: list[Finding] = []
     first = 0
     for name in dict.fromkeys(r.recording for r in residuals):
         own = [r for r in residuals if r.recording == name]
-        found += _recording(_Rest(own, stacked, slopes, basis, first), file_units or {})
+        found += _recording(Remainder(own, stacked, slopes, basis, first), file_units or {})
         first += sum(r.values.size for r in own)
     return found
 
@@ -185,22 +71,7 @@ def _usable(residual: Residual) -> bool:
     return bool(residual.values.size >= _LEAST and np.all(np.isfinite(residual.values)))
 
 
-def _orthonormal(slopes: FloatArray) -> FloatArray:
-    """Orthonormal basis (N, k) of the columns of (N, p), those that do nothing left out."""
-    norms = np.linalg.norm(slopes, axis=0)
-    slopes = slopes[:, norms > 0.0] / norms[norms > 0.0]
-    if slopes.shape[1] == 0:
-        return np.zeros((slopes.shape[0], 0))
-    left, singular, _ = np.linalg.svd(slopes, full_matrices=False)
-    return np.asarray(left[:, singular > 1e-7 * singular[0]])
-
-
-def _floor(values: FloatArray) -> float:
-    """Variance of the white part of a residual; no more than all of it."""
-    return min(noise_estimate(values, smooth=False) ** 2, float(np.mean(values**2)))
-
-
-def _recording(rest: _Rest, file_units: Mapping[str, str | None]) -> Iterator[Finding]:
+def _recording(rest: Remainder, file_units: Mapping[str, str | None]) -> Iterator[Finding]:
     against = [f for r in rest.own if (f := _against(r)) is not None]
     if against:
         yield from against  # of a fit to the wrong sign nothing else is told
@@ -239,20 +110,20 @@ def _against(residual: Residual) -> Finding | None:
     return Finding(residual.recording, name, "sign", "error", text, (), remedy)
 
 
-def _column(rest: _Rest, k: int, own: FloatArray) -> _Column:
+def _column(rest: Remainder, k: int, own: FloatArray) -> Column:
     return [(rest.rows[k], own)]
 
 
-def _candidates(rest: _Rest, k: int) -> Iterator[_Slip]:
+def _candidates(rest: Remainder, k: int) -> Iterator[Slip]:
     """Every slip of channel ``k``, with the size that explains most."""
     residual = rest.own[k]
     time, one = residual.time, np.ones(residual.values.size)
     middle = 0.5 * (time[0] + time[-1])
 
-    def linear(kind: str, shape: FloatArray, at: float = 0.0, weight: float = 1.0) -> _Slip:
+    def linear(kind: str, shape: FloatArray, at: float = 0.0, weight: float = 1.0) -> Slip:
         column = _column(rest, k, -shape / residual.noise)
         size, gain = rest.gain(column)
-        return _Slip(kind, residual.channel, column, size, gain, at, weight)
+        return Slip(kind, residual.channel, column, size, gain, at, weight)
 
     yield linear("offset", one)
     yield _drift(rest, k, time - middle)
@@ -264,17 +135,17 @@ def _candidates(rest: _Rest, k: int) -> Iterator[_Slip]:
     yield from _delayed(rest, [k], residual.channel)
 
 
-def _drift(rest: _Rest, k: int, elapsed: FloatArray) -> _Slip:
+def _drift(rest: Remainder, k: int, elapsed: FloatArray) -> Slip:
     """A drift from wherever it begins: a straight line over ``elapsed`` s."""
     residual = rest.own[k]
     span = float(np.ptp(elapsed))
     shapes = np.column_stack((np.ones(elapsed.size), elapsed / span)) / -residual.noise
     level, slope = rest.best(rest.rows[k], shapes)
     column = _column(rest, k, shapes @ (level, slope))
-    return _Slip("drift", residual.channel, column, slope / span, rest.drop(column), weight=_CHOSEN)
+    return Slip("drift", residual.channel, column, slope / span, rest.drop(column), weight=_CHOSEN)
 
 
-def _delayed(rest: _Rest, which: Sequence[int], channel: str) -> Iterator[_Slip]:
+def _delayed(rest: Remainder, which: Sequence[int], channel: str) -> Iterator[Slip]:
     """The channels ``which`` later (earlier) than simulated, by the delay that explains most."""
     step = float(np.median(np.diff(rest.own[which[0]].time)))
 
@@ -286,10 +157,10 @@ def _delayed(rest: _Rest, which: Sequence[int], channel: str) -> Iterator[_Slip]
         best = float(max(near, key=lambda by: rest.drop(_late(rest, which, float(by)))))
         width /= 3.0
     column = _late(rest, which, best)
-    yield _Slip("delay", channel, column, best, rest.drop(column))
+    yield Slip("delay", channel, column, best, rest.drop(column))
 
 
-def _late(rest: _Rest, which: Sequence[int], by: float) -> _Column:
+def _late(rest: Remainder, which: Sequence[int], by: float) -> Column:
     """What is left of channels that are late ``by`` s."""
     column = []
     for k in which:
@@ -299,7 +170,7 @@ def _late(rest: _Rest, which: Sequence[int], by: float) -> _Column:
     return column
 
 
-def _settled_delay(rest: _Rest, best: _Slip) -> _Slip:
+def _settled_delay(rest: Remainder, best: Slip) -> Slip:
     """The delay once more, now that what parameters do is late as well: a wrong one hid a part of it."""
     if rest.own[0].slopes.shape[1] > _MOST_SLOPES:
         return best
@@ -316,15 +187,17 @@ def _settled_delay(rest: _Rest, best: _Slip) -> _Slip:
     return replace(best, size=float(found.x))
 
 
-def _common_delay(rest: _Rest) -> Iterator[_Slip]:
+def _common_delay(rest: Remainder) -> Iterator[Slip]:
     """All outputs early by the same time: the input that moves is late."""
     moving = [n for n, x in rest.own[0].inputs.items() if np.ptp(x) > 0.0]
     if len(rest.own) > 1 and len(moving) == 1:
         for found in _delayed(rest, range(len(rest.own)), moving[0]):
-            yield _Slip("common-delay", found.channel, found.column, found.size, found.gain)
+            yield Slip("common-delay", found.channel, found.column, found.size, found.gain)
 
 
-def _finding(rest: _Rest, best: _Slip, share: float, file_units: Mapping[str, str | None]) -> Finding | None:
+def _finding(
+    rest: Remainder, best: Slip, share: float, file_units: Mapping[str, str | None]
+) -> Finding | None:
     """``best`` in words; None if it is too small, or no slip after all."""
     if best.kind == "common-delay":
         return _delay_finding(rest.own[0], best, -best.size, share)
@@ -368,9 +241,20 @@ def _in_file(offset: float, unit: str, file_unit: str | None) -> str:
     return f"{own:.4g}  # in {file_unit}, the unit of the file's numbers"
 
 
-def _delay_finding(residual: Residual, best: _Slip, by: float, share: float) -> Finding | None:
+def own_delay(time: FloatArray, simulated: FloatArray) -> float:
+    """Return the longest delay, in s, that the sampling itself makes of a command that changes between two samples.
+
+    A controller changes it at its own samples: where some are lost, or the answer is too fast, nobody knows when.
+    """
+    steps = np.diff(time)
+    usual, mean = float(np.median(steps)), float(np.sum(steps**2) / np.sum(steps))
+    hop, whole = float(np.max(np.abs(np.diff(simulated)))), float(np.ptp(simulated))
+    return mean if mean > _UNEVEN * usual or hop > _HOP * whole else _SHORT * usual
+
+
+def _delay_finding(residual: Residual, best: Slip, by: float, share: float) -> Finding | None:
     step = float(np.median(np.diff(residual.time)))
-    if abs(by) < _SHORT * step:
+    if abs(by) < own_delay(residual.time, residual.simulated):
         return None
     severity: Severity = "warning" if abs(by) < 20.0 * step else "error"
     word = "late" if by > 0.0 else "early"

@@ -9,11 +9,14 @@ from thsa_cosim.inspection.across import across_findings
 from thsa_cosim.inspection.channel import Channel
 from thsa_cosim.inspection.course import moving_start, temperature_drift, unequal_noise
 from thsa_cosim.inspection.finding import Finding, Inspection
+from thsa_cosim.inspection.jumps import jump_times, jumps
 from thsa_cosim.inspection.outliers import outliers
+from thsa_cosim.inspection.pairs import pair_findings
 from thsa_cosim.inspection.samples import dependent_samples, resolution, sentinels
 from thsa_cosim.inspection.spectrum import hum
 from thsa_cosim.inspection.stretches import clipped, repeated, stuck
 from thsa_cosim.inspection.time_axis import time_findings
+from thsa_cosim.inspection.time_unit import time_unit
 from thsa_cosim.recordings import Recording
 from thsa_cosim.signals import FloatArray
 
@@ -25,12 +28,17 @@ CHANNEL_DETECTORS: tuple[Callable[[Channel], Iterator[Finding]], ...] = (
     stuck,
     repeated,
     outliers,
+    jumps,
     hum,
     unequal_noise,
     temperature_drift,
     moving_start,
 )
+_OF_WRAPS = ("spikes", "dropouts", "interpolated-samples", "held-samples", "unequal-noise")
+"""What a counter that wraps looks like besides."""
 _LEAST = 16
+_ROUNDING = 1e-7
+"""Noise in shares of the largest value, that rounding to single precision makes."""
 _APART = 1.6
 """Ratio of one sensor's noise in one recording to that in the others."""
 
@@ -60,13 +68,30 @@ def inspect_channels(
     for time in times:
         yield from time_findings(recording, time)
     usable = [c for c in channels if c.values.size >= _LEAST and c.plain.min() < c.plain.max()]
-    jumps = np.unique(np.concatenate([np.empty(0), *(c.jumps for c in usable if c.role != "output")]))
-    if jumps.size:  # a copy finds all of its facts anew
-        usable = [replace(c, commanded=jumps) for c in usable]
+    usable = _with_commands(usable)
+    told: set[tuple[str, str]] = set()
     for channel in usable:
-        for detect in CHANNEL_DETECTORS:
-            yield from detect(channel)
-    yield from across_findings(usable)
+        found = [f for detect in CHANNEL_DETECTORS for f in detect(channel)]
+        wraps = any(f.kind == "wrapped" for f in found)
+        found = [f for f in found if not wraps or f.kind not in _OF_WRAPS]
+        told |= {(f.channel, f.kind) for f in found}
+        yield from found
+    between = [*across_findings(usable), *pair_findings(usable)]
+    yield from (f for f in between if (f.channel, f.kind) not in told)
+    if not any((f.channel, f.kind) == ("time", "unit") for f in between):
+        yield from time_unit(recording, usable)
+
+
+def _with_commands(channels: Sequence[Channel]) -> list[Channel]:
+    """The channels with the times at which something else jumps, whose answer is no defect."""
+    jumps = {c.name: c.jumps if c.jumps.size else jump_times(c) for c in channels if c.role != "output"}
+    found = []
+    for channel in channels:
+        others = [times for name, times in jumps.items() if name != channel.name or channel.jumps.size]
+        commanded = np.unique(np.concatenate([np.empty(0), *others]))
+        # A copy finds all of its facts anew.
+        found.append(replace(channel, commanded=commanded) if commanded.size else channel)
+    return found
 
 
 def _channel(recording: Recording, name: str, driven: bool) -> Channel:
@@ -98,7 +123,11 @@ def _noises(recordings: Sequence[Recording], inputs: Collection[str]) -> Iterato
     """One sensor has one noise: a recording in which it is another was made with something else."""
     names = dict.fromkeys(name for r in recordings for name in r.samples if name not in inputs)
     for name in names:
-        noises = {r.name: r.noise[name] for r in recordings if r.noise.get(name, 0.0) > 0.0}
+        # Rounding (1e-16) is no sensor's noise: such a channel was computed.
+        least = _ROUNDING * max(
+            (float(np.max(np.abs(r.signals[name]))) for r in recordings if name in r.signals), default=0.0
+        )
+        noises = {r.name: r.noise[name] for r in recordings if r.noise.get(name, 0.0) > least}
         if len(noises) < 2:
             continue
         usual = float(np.median(list(noises.values())))

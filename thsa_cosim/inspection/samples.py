@@ -15,6 +15,8 @@ _DITHERED = 0.7
 _WINDOW, _MORE, _PART = 64, 0.3, 0.15
 """Samples of a window; share of repeated values beyond chance, and share of such windows, that are no chance."""
 _BURSTS, _LEAST = 5, 4
+_LONGEST = 41
+"""Samples of one value, from which on it is rest, or a sensor that is stuck."""
 _ABOVE = 2.0
 """Quantisation steps of noise from which on a value that repeats is no chance."""
 _SKIPPED, _VISITED = 2.0, 0.5
@@ -73,7 +75,7 @@ def _partly_held(channel: Channel) -> Iterator[Finding]:
     seen = min(0.8, 1.3 * max(usual, float(np.median(np.mean(windows, axis=1))), 1e-3))
     limit = max(3.0, 1.0 + np.log(1e-3 / channel.values.size) / np.log(seen))
     inside = ~np.isin(channel.plain[starts], (channel.clean.min(), channel.clean.max()))
-    bursts = short & inside & (lengths > limit)
+    bursts = (lengths <= _LONGEST) & inside & (lengths > limit)
     if np.mean(often) > _PART:
         mask = np.zeros(channel.values.shape, dtype=np.bool_)
         mask[1 : 1 + windows.size] = np.repeat(often, _WINDOW)

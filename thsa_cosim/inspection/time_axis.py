@@ -46,7 +46,7 @@ def time_findings(recording: str, time: FloatArray) -> Iterator[Finding]:
             where,
         )
     if back.any():
-        yield found("repeated-stamps", "error", f"time goes back {np.sum(back)} times", _spans(time, back))
+        yield found("repeated-stamps", "error", _goes_back(time, back), _spans(time, back))
     distances = distances[distances > 0.0]
     if distances.size < 8:
         return
@@ -69,6 +69,18 @@ def time_findings(recording: str, time: FloatArray) -> Iterator[Finding]:
         severity = "warning" if scatter > _JITTER else "note"
         text = f"stamps scatter by {100.0 * scatter:.2g} % of the step of {float(np.median(step)):.4g} s"
         yield found("jitter", severity, text)
+
+
+def _goes_back(time: FloatArray, back: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> str:
+    """How time goes back, in words."""
+    count, first = int(np.sum(back)), int(np.argmax(back))
+    if count > 1:
+        return f"time goes back {count} times"
+    text = f"time goes back once, from {time[first]:.6g} s to {time[first + 1]:.6g} s"
+    again = time[first + 1 : first + 5]
+    if first > 2 and again.size > 3 and np.all(again < time[first]):
+        text += ": the logger started again, or two recordings are joined"
+    return text
 
 
 def local_step(distances: FloatArray) -> FloatArray:

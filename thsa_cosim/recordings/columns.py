@@ -21,7 +21,7 @@ _ENDINGS = (
 )  # fmt: skip
 #: What drives state their speed in; that it counts turns is for the scenario to say, and for a draft to propose.
 _PER_MINUTE = {"1/min", "min-1", "min^-1", "min⁻¹", "/min", "U/min", "Upm"}
-_TIME_NAMES = {"time", "t", "zeit", "temps", "timestamp", "elapsed", "seconds"}
+TIME_NAMES = {"time", "t", "zeit", "temps", "timestamp", "elapsed", "seconds"}
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,10 @@ def find_columns(path: Path) -> tuple[FoundColumn, ...]:
     RecordingError
         If the file cannot be read, or holds no such column.
     """
-    found = []
+    found, problem = [], ""
     for name, raw in load_columns(path).items():
         if raw.problem or raw.values.size < 2:
+            problem = problem or f" ({name!r} {raw.problem or 'holds fewer than two values'})"
             continue
         rows = sparse_rows(raw.values)
         values = raw.values if rows is None else raw.values[rows]
@@ -88,7 +89,9 @@ def find_columns(path: Path) -> tuple[FoundColumn, ...]:
             )
         )
     if not found:
-        raise RecordingError(f"{path}: holds no column of finite numbers; repair or export it again.")
+        raise RecordingError(
+            f"{path}: holds no column of finite numbers{problem}; repair or export it again."
+        )
     return tuple(found)
 
 
@@ -116,7 +119,7 @@ def unused_columns(path: Path, found: Sequence[FoundColumn]) -> dict[str, str]:
 def time_column(columns: Sequence[FoundColumn]) -> FoundColumn | None:
     """Return the column that is time: an increasing one, by its name, else by its unit; None if there is none."""
     rising = [c for c in columns if c.increasing and (c.unit is None or same_dimension(c.unit, "s"))]
-    named = [c for c in rising if _TIME_NAMES & {word.lower() for word in c.words}]
+    named = [c for c in rising if TIME_NAMES & {word.lower() for word in c.words}]
     timed = [c for c in rising if c.unit is not None]
     return next(iter([*named, *timed]), None)
 

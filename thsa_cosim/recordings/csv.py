@@ -33,6 +33,8 @@ _NUMBER = {
     mark: re.compile(rf"[+-]?(\d+({re.escape(mark)}\d*)?|{re.escape(mark)}\d+)([eE][+-]?\d+)?")
     for mark in ".,"
 }
+_MOST_WORDS = 20
+"""Lines of words under a table."""
 _HALF_DAY = re.compile(r"\s*([aApP])\.?[mM]\.?$")
 _STAMP = re.compile(r"(\d{4}-\d\d-\d\d|\d{1,2}[./]\d{1,2}[./]\d{2,4})([ T]+\d{1,2}:\d\d.*)?|\d+:\d\d:\d\d.*")
 _DAY = re.compile(r"(\d{1,2})[./](\d{1,2})[./](\d{4}|\d\d)(?:[ T]+(.*))?")
@@ -68,6 +70,7 @@ def read(path: Path, choose: Choose) -> dict[str, RawColumn]:
     numbered = _lines(path)
     layout = _layout(path, numbered)
     rows = [(number, line) for number, line in numbered[layout.first :] if not line.startswith(_COMMENTS)]
+    rows = _without_end(path, rows, layout)
     chosen = list(dict.fromkeys(choose([name for name in layout.header if name])))
     places = [layout.header.index(name) for name in chosen]
     columns: dict[str, RawColumn] = {}
@@ -85,15 +88,38 @@ def _lines(path: Path) -> list[tuple[int, str]]:
     content = path.read_bytes()
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         text = content.decode("utf-16", "replace")
+    elif (
+        len(content) > 200 and content[1:200:2].count(0) > 90 and 0 not in content[0:200:2]
+    ):  # without its mark
+        text = content.decode("utf-16-le", "replace")
     else:
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = content.decode("cp1252", "replace")
+    text = text.rstrip("\0")  # blocks that were allocated when the power went
     if "\0" in text:
         raise RecordingError(f"{path}: is binary, not a text table; check its format and ending.")
-    lines = re.split(r"\r\n|\n|\r", text)
+    lines = re.split(r"\r\n|\n|\r", text.replace("\u2212", "-"))
     return [(k, line) for k, line in enumerate(lines, start=1) if line.strip(" \t;,")]
+
+
+def _without_end(path: Path, rows: list[tuple[int, str]], layout: _Layout) -> list[tuple[int, str]]:
+    """Leave out a last line that was cut off, and words under the table; a second header is refused."""
+    for number, line in rows:
+        if line[:1] not in "0123456789+-.," and _split(line, layout.delimiter) == layout.header:
+            raise RecordingError(
+                f"{path}: line {number} holds the header again, so two recordings are joined; split the file there."
+            )
+    last = len(rows)
+    while last > 1 and len(rows) - last < _MOST_WORDS:
+        cells = _split(rows[last - 1][1], layout.delimiter)
+        words = bool(cells) and not any(_is_number(cell, layout.decimal) for cell in cells)
+        cut = last == len(rows) and len(cells) < layout.width - 1
+        if not (words and len(cells) < layout.width) and not cut:
+            break
+        last -= 1
+    return rows[:last]
 
 
 def _split(line: str, delimiter: str) -> list[str]:

@@ -52,6 +52,8 @@ class Column:
         A constant [unit] instead of a column.
     scale, offset
         Applied to the file's numbers first: ``scale * x + offset`` (a sign flip is ``scale = -1``).
+    unwrap
+        Period of the file's numbers, where a counter or an angle starts again; taken out before ``scale``.
     shift
         s; the signal is moved to later times by this much (negative: a sensor lag is taken out).
     smooth
@@ -73,6 +75,7 @@ class Column:
     value: float | None = None
     scale: float = 1.0
     offset: float = 0.0
+    unwrap: float | None = None
     shift: float = 0.0
     smooth: Literal["none", "mean", "piecewise-linear"] = "none"
     noise: float | None = None
@@ -248,7 +251,7 @@ def read_recording(
         missing = coded(column.values, source.repair)
         check_finite(path, source.column, column.values, t, kept & ~missing)
         with np.errstate(over="ignore", invalid="ignore"):
-            numbers = source.scale * column.values + source.offset
+            numbers = source.scale * _unwrapped(column.values, source.unwrap) + source.offset
             numbers = _to_unit(path, signal, source, column.unit, targets.get(signal), numbers)
         check_finite(path, source.column, numbers, t, kept & ~missing)
         mended = repaired(
@@ -267,6 +270,14 @@ def read_recording(
             column.values[kept],
         )
         repairs += mended.done
+        if source.unwrap is not None:
+            turns = int(
+                np.sum(
+                    np.abs(np.diff(_unwrapped(column.values, source.unwrap) - column.values))
+                    > 0.5 * source.unwrap
+                )
+            )
+            repairs.append(f"{signal}: unwrapped {turns} times by {source.unwrap:g} of the file's numbers")
         if mended.left_out.any():
             numbers = numbers.copy()
             numbers[kept] = mended.values
@@ -426,6 +437,16 @@ def _to_unit(
         return convert(values, unit, target or unit)
     except UnitError as error:
         raise UnitError(f"{path}: column {label!r} for {signal.strip(chr(0))!r}: {error}") from None
+
+
+def _unwrapped(values: FloatArray, period: float | None) -> FloatArray:
+    """(n,) values without the jumps of a counter that starts again after ``period``."""
+    if period is None:
+        return values
+    finite = np.isfinite(values)
+    found = values.copy()
+    found[finite] = np.unwrap(values[finite], period=period)
+    return found
 
 
 def _temperature(

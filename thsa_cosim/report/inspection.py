@@ -74,7 +74,7 @@ def print_trust(console: Console, trust: Trust) -> None:
     if trust.verdict == "explained":
         return
     line = Text("not explained: ", style="red")
-    line.append("do not trust the values above: the model leaves more than noise", style="default")
+    line.append("do not trust the values above, for these reasons", style="default")
     console.print(line, soft_wrap=True)
     for reason in trust.reasons:
         console.print(Text(f"  {reason}"), soft_wrap=True)

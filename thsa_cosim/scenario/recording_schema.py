@@ -69,6 +69,8 @@ class ColumnTable(Table):
     """The file's numbers are multiplied by this first (-1 flips a sign)."""
     offset: Moderate = 0.0
     """Then this is added, in the file's unit."""
+    unwrap: Positive | None = None
+    """Period, in the file's numbers, of a counter or an angle that starts again: 65536, 360, 6.283185307."""
     shift: Moderate = 0.0
     """s; moves the signal to later times (negative: removes the lag of a sensor)."""
     smooth: Literal["none", "mean", "piecewise-linear"] = "none"

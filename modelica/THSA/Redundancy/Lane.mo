@@ -7,6 +7,7 @@ model Lane "Motor lane: power electronics, velocity and current loop, motor with
   THSA.Interfaces.RealInput T_w(unit="degC") "Temperature of the winding";
   THSA.Interfaces.RealOutput w_s(unit="rad/s") "Speed as the resolver gives it";
   THSA.Interfaces.RotationalFlange flange "Shaft";
+  input THSA.Units.Torque tau_f = 0 "Added friction torque at the motor";
   parameter THSA.Units.Time t_loss(min=-1, max=1e9) = 1e9 "Failure: time from which the electronics give no current";
   parameter THSA.Units.Time t_sensor(min=-1, max=1e9) = 1e9 "Failure: time from which the resolver reads 0";
   parameter THSA.Units.Time t_jam(min=-1, max=1e9) = 1e9 "Failure: time from which the rotor is jammed";
@@ -14,7 +15,7 @@ model Lane "Motor lane: power electronics, velocity and current loop, motor with
   THSA.Controllers.VelocityController velocityController(K_p=0.363, K_i=2.98) "Velocity loop, the law to tune";
   THSA.Controllers.CurrentController currentController "Current loop";
   THSA.Redundancy.MotorBrake brake "Motor brake";
-  THSA.Motor motor(T_w=T_w, tau_f=brake.tau + (if time >= t_jam then T_jam*motor.friction.s else 0)) "Motor";
+  THSA.Motor motor(T_w=T_w, tau_f=brake.tau + (if time >= t_jam then T_jam*motor.friction.s else 0) + tau_f) "Motor";
   Boolean powered "The bridge drives";
   THSA.Units.Power P_el "Power at the motor's terminals";
   THSA.Units.Power P_loss "All that the lane turns into heat";

@@ -120,6 +120,9 @@ def test_a_model_without_slots_and_an_unknown_effect_are_refused_in_one_sentence
 
 def test_slots_are_inherited_less_those_that_are_taken(tmp_path: Path, slots: tuple[Slot, ...]):
     assert find_slots("THSA.ThermalActuator", PACKAGE) == slots
+    redundant = find_slots("THSA.RedundantActuator", PACKAGE)
+    assert [slot.name for slot in redundant] == ["motor", "gearbox", "screw"]
+    assert all(slot in slots for slot in redundant)
     own = tmp_path / "Motor2.mo"
     own.write_text(
         "model Motor2\n"

@@ -12,7 +12,7 @@ from thsa_cosim.diagnosis.choosing.gates import out_of_range
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, score
 from thsa_cosim.diagnosis.choosing.screen import screen
-from thsa_cosim.diagnosis.fitting.fit import refine
+from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 
 NAMES = ("windage", "stribeck", "asymmetric-friction", "load-dependent-friction", "cogging")
@@ -48,6 +48,36 @@ def test_the_effect_that_is_there_is_accepted_with_its_value(windage: Attributio
     np.testing.assert_allclose(np.mean(windage.final_validate**2), 1.0, atol=0.1)
 
 
+def test_what_the_declared_model_leaves_is_given_in_standard_deviations_of_the_noise(windage: Attribution):
+    """The search weighs signals by what the model leaves in them; its result does not."""
+    own = bench(candidates(*NAMES), WINDAGE)
+    vector = windage.base.vector[None, :]
+    (fit,) = own.residuals(unknowns(), vector, "fit")
+    (held,) = own.residuals(unknowns(), vector, "validate")
+    assert fit is not None
+    assert windage.base_cost == pytest.approx(cost_of(unknowns(), windage.base.vector, fit))
+    assert windage.base_cost > 2.0 * fit.size, "or there would be nothing to weigh"
+    np.testing.assert_allclose(windage.base_validate, held)
+    assert windage.rounds[0].factors.shape == fit.shape
+    np.testing.assert_allclose(windage.base.residual, fit * windage.rounds[0].factors)
+
+
+def test_the_search_starts_where_it_is_told_to_and_repeats_itself():
+    offered = candidates("windage")
+    own = bench(offered, WINDAGE)
+    start = 1.02 * np.array([1.5, 0.2, 0.4, 0.01])
+    found = attribute(own, unknowns(), offered, lambda _: {}, start=start, seed=1)
+    first = own._engine._runner.ran[0].values  # type: ignore[attr-defined]
+    assert [first[name] for name in unknowns().names] == pytest.approx(start)
+    again = [
+        attribute(bench(offered, WINDAGE), unknowns(), offered, lambda _: {}, start=start, seed=seed)
+        for seed in (1, 2)
+    ]
+    assert found is not None
+    limits = [a.rounds[0].threshold for a in again if a is not None]
+    assert found.rounds[0].threshold == limits[0] != limits[1]
+
+
 @pytest.fixture(scope="module")
 def stribeck() -> Attribution:
     return diagnosed(STRIBECK)
@@ -77,6 +107,15 @@ def test_two_effects_are_found_one_after_the_other():
     found = diagnosed(both)
     assert {s.candidate.effect.name for s in found.accepted} == {"windage", "stribeck"}
     assert len(found.rounds) == 2
+    for number, one in enumerate(found.rounds):
+        gains = [p.gain for p in one.proposals]
+        assert gains == sorted(gains, reverse=True)
+        assert all((p.response.size > 0) is (number == 0) for p in one.proposals), (
+            "the first ones are compared"
+        )
+    assert {p.candidate.name for p in found.rounds[1].proposals} < {
+        p.candidate.name for p in found.rounds[0].proposals
+    }
     assert diagnosed(both, most=1).accepted[1:] == ()
 
 
@@ -184,6 +223,35 @@ def test_an_earlier_effect_that_a_later_one_makes_needless_is_dropped():
     assert notes == ["windage:motor was dropped: the effects found after it explain the same"]
 
 
+def test_all_that_became_needless_is_dropped_and_the_last_one_stays():
+    own, declared, weights, accepted, final, held = accepted_by_hand(
+        STRIBECK, "asymmetric-friction:motor", "windage:motor", "stribeck:motor"
+    )
+    kept, fit, _, notes = prune(own, declared, weights, accepted, final, held)
+    assert [s.candidate.name for s in kept] == ["stribeck:motor"]
+    assert set(fit.unknowns.names) == {*declared.names, *STRIBECK}
+    assert len(notes) == 2
+
+
+def test_a_needless_one_behind_a_needed_one_is_dropped_alone():
+    own, declared, weights, accepted, final, held = accepted_by_hand(
+        {**WINDAGE, **STRIBECK}, "windage:motor", "asymmetric-friction:motor", "stribeck:motor"
+    )
+    kept, _, _, notes = prune(own, declared, weights, accepted, final, held)
+    assert [s.candidate.name for s in kept] == ["windage:motor", "stribeck:motor"]
+    assert notes == ["asymmetric-friction:motor was dropped: the effects found after it explain the same"]
+
+
+def test_what_cannot_be_fitted_without_an_effect_keeps_it():
+    own, declared, weights, accepted, final, held = accepted_by_hand(
+        STRIBECK, "windage:motor", "stribeck:motor"
+    )
+    own.residuals = lambda *_: [None]  # type: ignore[method-assign]
+    kept, fit, _, notes = prune(own, declared, weights, accepted, final, held)
+    assert (kept, notes) == (accepted, [])
+    assert fit is final
+
+
 def test_effects_that_are_both_needed_stay():
     own, declared, weights, accepted, final, held = accepted_by_hand(
         {**WINDAGE, **STRIBECK}, "windage:motor", "stribeck:motor"
@@ -206,8 +274,18 @@ def test_a_ripple_of_several_orders_is_one_effect_with_all_of_them():
     offered = candidates(*NAMES)
     own = bench(offered, RIPPLE)
     waves = {"motor": (7.0, 12.0, 18.0, 31.0)}
-    found = attribute(own, unknowns(), offered, lambda fit: waves, seed=1, most=1)
+    seen: list[Fit] = []
+
+    def scan(fit: Fit) -> Mapping[str, tuple[float, ...]]:
+        seen.append(fit)
+        return waves
+
+    found = attribute(own, unknowns(), offered, scan, seed=1, most=1)
     assert found is not None
+    assert seen[0] is found.base
+    assert [s.misfit for s in seen] == sorted((s.misfit for s in seen), reverse=True), (
+        "each round its residual"
+    )
     assert [s.candidate.name for s in found.accepted] == ["cogging:motor"] * 3
     machine = Machine({"motor": {"motor": 1.0}}, {"motor": 60.0})
     (effect,) = found_effects(found, found.final, machine)

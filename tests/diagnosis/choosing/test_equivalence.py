@@ -75,6 +75,13 @@ def test_what_drowns_in_chance_is_in_no_class_and_the_best_start_counts():
     assert equivalence(attribution()) == ()
 
 
+def test_an_effect_is_as_large_as_its_ordinary_size_squared_makes_it():
+    """Half a unit of a response of 10: a gain of 25, above the 16 of chance."""
+    halves = [proposal(name, at(angle, 10.0), size=0.5) for name, angle in (("a", 0.0), ("b", 0.05))]
+    assert [c.names for c in equivalence(attribution(*halves))] == [("a", "b")]
+    assert equivalence(attribution(*halves, threshold=25.1)) == ()
+
+
 def test_classes_come_closest_first_and_one_of_many_coefficients_counts_by_its_strongest():
     e = BASIS
 

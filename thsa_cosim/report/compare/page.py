@@ -23,24 +23,26 @@ from thsa_cosim.report.parts.text import DASH, number, text_cell
 COLUMNS = 3
 
 
-def write_comparison(found: Comparison, target: Path, trends: Sequence[Trend] = ()) -> Path:
-    """Write the page of a comparison, with ``trends`` if any, to ``target``; return it.
+def write_comparison(
+    found: Comparison, target: Path, trends: Sequence[Trend] = (), sentence: str = ""
+) -> Path:
+    """Write the page of a comparison, with ``trends`` and their ``sentence`` if any, to ``target``; return it.
 
     InputError if it cannot be written.
     """
     title = " and ".join(found.labels) if len(found.labels) < 4 else f"{len(found.labels)} studies"
-    own = [_trends(trends), *sections(found)] if trends else sections(found)
+    own = [_trends(trends, sentence), *sections(found)] if trends else sections(found)
     write_html(target, render(Heading("compare", title, "complete"), own))
     return target
 
 
-def _trends(trends: Sequence[Trend]) -> Section:
+def _trends(trends: Sequence[Trend], sentence: str) -> Section:
     columns = [Column(text, numeric=False) for text in ("quantity", "at", "unit")]
     columns += [Column(text) for text in TREND_COLUMNS]
     rows = [[text_cell(c) for c in (t.name, t.at, t.unit, *trend_cells(t))] for t in trends]
     note = "Expected: what the earlier studies predict for the latest one, with the scatter between them."
     table = Table("Trends, the studies in the order of time", columns, rows, note)
-    return Section("trends", "Trends", (Text(told(trends), "lead"), table))
+    return Section("trends", "Trends", (Text(sentence or told(trends), "lead"), table))
 
 
 def sections(found: Comparison) -> list[Section]:

@@ -43,9 +43,9 @@ def print_comparison(console: Console, found: Comparison) -> None:
         console.print(Text(f"note: {note}"), highlight=False)
 
 
-def print_trends(console: Console, trends: Sequence[Trend]) -> None:
-    """Print the alarms in a sentence and the trend of every quantity."""
-    console.print(Text(told(trends), style="bold"), highlight=False)
+def print_trends(console: Console, trends: Sequence[Trend], sentence: str = "") -> None:
+    """Print the alarms in a sentence (default: those of the trends) and the trend of every quantity."""
+    console.print(Text(sentence or told(trends), style="bold"), highlight=False)
     table = Table(title="Trends, the studies in the order of time", title_justify="left")
     table.add_column("quantity", overflow="fold")
     table.add_column("at")
@@ -66,10 +66,10 @@ def trend_cells(t: Trend) -> tuple[str, ...]:
     return (
         number(t.latest, 4),
         plus_minus(t.expected, t.scatter),
-        number(t.jump, 2),
+        number(t.single, 2),
         plus_minus(t.slope, t.slope_stderr),
         number(t.drift, 2),
-        t.alarm or DASH,
+        t.alarm or ("one study" if t.is_suspect else DASH),
     )
 
 

@@ -23,19 +23,24 @@ from thsa_cosim.report.parts.text import (
     significant_cell,
     text_cell,
 )
+from thsa_cosim.report.progress import duration
 from thsa_cosim.report.tune.gains import term_label
 from thsa_cosim.report.tune.responses import first_response
 
 _STATUS = {
-    "running": "The study is running. These are its results so far; the report command writes the page again.",
+    "running": "The study is running. These are its results so far; the report command writes the page again,"
+    " with --live until the study ends.",
     "stopped": "The study was stopped before its end. Its finished runs are kept.",
     "unfinished": "The study has not ended. Its folder does not show whether it is still running.",
     "interrupted": "The study was interrupted. These are the results of its finished part.",
 }
 
 
-def summary(study: Study) -> Section:
-    """What came out, the picture that shows it, before and after, and what to do next; for any kind of study."""
+def summary(study: Study, rate: float = 0.0) -> Section:
+    """What came out, the picture that shows it, before and after, and what to do next; for any kind of study.
+
+    ``rate``: evaluations a second of a study that runs; 0 where it is not known.
+    """
     blocks: list[Block] = []
     status = study.status
     if status in _STATUS:
@@ -43,7 +48,7 @@ def summary(study: Study) -> Section:
         again = f" Continue with: {command}" if command and status != "running" else ""
         blocks.append(Text(_STATUS[status] + again, "bad" if status == "stopped" else ""))
     started = [part for part in study.parts if part.result is None and part.journal is not None]
-    blocks += [Text(f"{part.title}: {_so_far(part)}") for part in started]
+    blocks += [Text(f"{part.title}: {_so_far(part, rate)}") for part in started]
     if study.whole.result is None:
         blocks.append(_question_facts(study))
     else:
@@ -143,14 +148,21 @@ def _question(part: Part) -> str:
     return ""
 
 
-def _so_far(part: Part) -> str:
+def _so_far(part: Part, rate: float) -> str:
     done, broken = evaluations(part), sum(failed(part).values())
     stages = len({row.stage for row in part.journal.rows}) if part.journal else 0
-    of = ""
+    of = pace = ""
     if part.population and part.generations and stages:
         searches = len(part.about.get("samples", {})) or stages
-        of = f" of at most {searches * part.population * (part.generations + 1)}"
-    return f"{count(done, 'vector')} evaluated{of} in {count(stages, 'search', 'searches')}, {broken} failed so far."
+        most = searches * part.population * (part.generations + 1)
+        of = f" of at most {most}"
+        if rate > 0.0 and most > done:
+            pace = f" At most {duration((most - done) / rate)} left"
+            pace += ", less where local searches agree." if part.searches_locally else "."
+    if rate > 0.0:
+        pace = f" {number(rate, 3)} evaluations a second.{pace}"
+    searched = count(stages, "search", "searches")
+    return f"{count(done, 'vector')} evaluated{of} in {searched}, {broken} failed so far.{pace}"
 
 
 def _found_table(result: Json) -> Table:

@@ -25,6 +25,7 @@ from thsa_cosim.report.parts.comparison import comparison
 from thsa_cosim.report.parts.content import Block, Figure, Fold, Section
 from thsa_cosim.report.parts.convergence import convergence
 from thsa_cosim.report.parts.data import data
+from thsa_cosim.report.parts.evaluations import evaluated
 from thsa_cosim.report.parts.failures import failures
 from thsa_cosim.report.parts.provenance import provenance
 from thsa_cosim.report.tune.gains import gains
@@ -40,17 +41,25 @@ SectionOf = Callable[[Part], Section | None]
 
 #: Sections of a part by kind of study, in the order of the page.
 SECTIONS: dict[str, tuple[SectionOf, ...]] = {
-    "identify": (data, comparison, convergence, correlation),
+    "identify": (data, comparison, convergence, evaluated, correlation),
     "simulate": (data, comparison),
-    "diagnose": (data, attribution, before_after, structure, recordings, candidates, convergence),
-    "tune": (data, gains, responses, start, plane, schedule, pareto, convergence),
+    "diagnose": (data, attribution, before_after, structure, recordings, candidates, convergence, evaluated),
+    "tune": (data, gains, responses, start, plane, schedule, pareto, convergence, evaluated),
 }
 
 
-def write_page(folder: Path, output: Path | None = None) -> Path:
+@dataclass(frozen=True)
+class Live:
+    """A page that is written again: ``every`` s, while the study makes ``rate`` evaluations a second (0: unknown)."""
+
+    every: float
+    rate: float = 0.0
+
+
+def write_page(folder: Path, output: Path | None = None, live: Live | None = None) -> Path:
     """Write the page of the study in ``folder``, finished or running; return its path.
 
-    ``output``: the file to write; default ``report.html`` in the folder.
+    ``output``: the file to write; default ``report.html`` in the folder. ``live``: the browser loads the page anew.
 
     Raises
     ------
@@ -59,7 +68,8 @@ def write_page(folder: Path, output: Path | None = None) -> Path:
     """
     study = read_study(folder)
     target = output or folder / PAGE
-    write_html(target, render(Heading(study.whole.kind, study.whole.title, study.status), sections(study)))
+    heading = Heading(study.whole.kind, study.whole.title, study.status, 0.0 if live is None else live.every)
+    write_html(target, render(heading, sections(study, live.rate if live else 0.0)))
     return target
 
 
@@ -78,13 +88,13 @@ def write_html(target: Path, html: str) -> None:
         partial.unlink(missing_ok=True)
 
 
-def sections(study: Study) -> list[Section]:
-    """All sections of a study's page that have something to show.
+def sections(study: Study, rate: float = 0.0) -> list[Section]:
+    """All sections of a study's page that have something to show; ``rate``: evaluations a second, if it runs.
 
     Raises InputError if the result does not have the form that this version writes.
     """
     try:
-        return list(_sections(study))
+        return list(_sections(study, rate))
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         what = " ".join(f"{type(error).__name__}: {error}".split())[:120]
         raise InputError(
@@ -93,8 +103,8 @@ def sections(study: Study) -> list[Section]:
         ) from error
 
 
-def _sections(study: Study) -> list[Section]:
-    found: list[Section | None] = [summary(study)]
+def _sections(study: Study, rate: float) -> list[Section]:
+    found: list[Section | None] = [summary(study, rate)]
     if study.whole.result is not None:
         found += [parameters(study.whole.result), friction(study.whole.result)]
     for part in study.parts:
@@ -113,6 +123,8 @@ class Heading:
     kind: str
     title: str
     status: str
+    again: float = 0.0
+    """s, after which the browser loads the page anew; 0: never."""
 
 
 def render(heading: Heading, shown: Sequence[Section]) -> str:

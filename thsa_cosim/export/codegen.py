@@ -167,7 +167,7 @@ def model_source(model: CausalModel) -> ModelSource:
         begin = implicit.begin(name)
         parts += _function(graph, name, listed, symbols, cached, bool(slow.inputs), before=begin)
     for name, listed in alone.items():
-        after = _after_dependent(slow, name)
+        after = _after_dependent(slow, name) + implicit.end(graph, name, symbols)
         begin = implicit.begin(name)
         parts += _function(graph, name, listed, symbols, {}, False, after=after, before=begin)
     parts.append(_tables(model))

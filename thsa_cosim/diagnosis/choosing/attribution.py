@@ -48,6 +48,13 @@ class Round:
     factors: FloatArray
     forms: tuple[Scored, ...] = ()
 
+    @property
+    def folded(self) -> "Round":
+        """The same without the Jacobians of what was not accepted."""
+        kept = {id(s): s if s is self.accepted else s.folded for s in (*self.scored, *self.rivals)}
+        scored, rivals = (tuple(kept[id(s)] for s in listed) for listed in (self.scored, self.rivals))
+        return replace(self, scored=scored, rivals=rivals)
+
     def probability(self, gain: float) -> float:
         """Probability that chance makes at least ``gain``."""
         return probability(gain, self.gains)
@@ -107,7 +114,9 @@ def attribute(
             free = [c for c in offered if not any(_is_taken(c, s.candidate) for s in accepted)]
             left = [c for c in free if not _is_known(c, current)]
             rounds.append(
-                _round(selection, left, scan(current), seed + len(rounds), accepted, offered is candidates)
+                _round(
+                    selection, left, scan(current), seed + len(rounds), accepted, offered is candidates
+                ).folded
             )
             if len(rounds) > 1:  # which effects are alike is told by the responses of the first
                 rounds[-1] = replace(rounds[-1], proposals=tuple(p.summary for p in rounds[-1].proposals))

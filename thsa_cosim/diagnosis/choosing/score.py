@@ -1,7 +1,7 @@
 """One candidate fitted together with the declared parameters, and its score on the held-out recordings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,11 @@ class Scored:
     def candidate(self) -> Candidate:
         """The candidate."""
         return self.proposal.candidate
+
+    @property
+    def folded(self) -> "Scored":
+        """The same with a `Fit.folded`: of long recordings, what is only listed must not hold a Jacobian."""
+        return replace(self, fit=self.fit.folded)
 
 
 def score(

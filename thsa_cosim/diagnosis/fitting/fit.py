@@ -53,6 +53,11 @@ class Fit:
         return np.asarray(self.jacobian.T @ self.jacobian + np.diag(prior**2))
 
     @property
+    def folded(self) -> "Fit":
+        """The same with R (n, n) in place of the Jacobian, RᵀR = JᵀJ: what covariances need, without a row a sample."""
+        return replace(self, jacobian=np.asarray(np.linalg.qr(self.jacobian, mode="r")))
+
+    @property
     def inflation(self) -> float:
         """Mean squared residual in variances of the noise, at least 1: how much less the recordings say for it."""
         return max(1.0, self.misfit / self.residual.size)

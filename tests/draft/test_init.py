@@ -12,6 +12,7 @@ from small_scenario import write_fmu
 
 from thsa_cosim import cli
 from thsa_cosim.draft import draft_from_columns, draft_scenario, find_columns, match_columns, time_column
+from thsa_cosim.errors import ParameterError
 from thsa_cosim.fmu import FmuDescription, Variable, read_description
 from thsa_cosim.fmu.description import DefaultExperiment
 from thsa_cosim.recordings.columns import FoundColumn, words
@@ -47,6 +48,53 @@ def test_shipped_recordings_are_matched_as_their_scenarios_do(
     assert data["recordings"]["time"] == {"column": "time_s", "unit": "s"}
     assert data["temperature"]["input"] == "T_amb"
     assert data["recordings"]["columns"]["T_amb"]["smooth"] == "mean"
+
+
+@needs_fmus
+def test_three_commands_from_a_recording_to_parameters_with_uncertainty(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    recording = RECORDINGS / "screw_p25.parquet"
+    init = [
+        "init",
+        "--fmu",
+        str(ROOT / "fmus" / "Screw.fmu"),
+        "--recording",
+        str(recording),
+        "-o",
+        "screw.toml",
+    ]
+    names = [v.name for v in read_description(ROOT / "fmus" / "Screw.fmu").parameters]
+    force, viscous = (next(n for n in names if n.endswith(end)) for end in ("F_fn.a0", "b_n.a0"))
+    assert cli.run_command([*init, "--identify", f"{force}=10:5000", "--identify", f"{viscous}=100:1e6"]) == 0
+    assert "is ready: thsa-cosim check screw.toml --sensitivity" in capsys.readouterr().out
+    assert cli.run_command(["check", "screw.toml", "--sensitivity"]) == 0
+    assert cli.run_command(["identify", "screw.toml", "-o", "study", "--workers", "1"]) == 0
+    (point,) = json.loads((tmp_path / "study" / "result.json").read_text())["points"]
+    for estimate in point["parameters"].values():
+        assert estimate["identifiable"]
+        assert 0.0 < estimate["stderr"] < 0.1 * abs(estimate["value"])
+
+
+@needs_fmus
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ("motor.R_s.a9", "has no parameter 'motor.R_s.a9' to identify. Did you mean"),
+        (
+            "motor.R_s.alpha1",
+            "starts at 0, which gives no bounds to search; add them as motor.R_s.alpha1=LOWER:UPPER",
+        ),
+        ("motor.R_s.a0=1", "The bounds '1' of 'motor.R_s.a0' are not LOWER:UPPER"),
+        ("motor.R_s.a0=5:1", "gives no bounds to search"),
+    ],
+)
+def test_a_parameter_that_cannot_be_identified_is_one_sentence(tmp_path: Path, asked: str, said: str) -> None:
+    fmu = read_description(ROOT / "fmus" / "Motor.fmu")
+    with pytest.raises(ParameterError) as caught:
+        draft_scenario(fmu, [RECORDINGS / "motor_p25.parquet"], tmp_path / "scenario.toml", [asked])
+    assert said in str(caught.value)
 
 
 @needs_fmus

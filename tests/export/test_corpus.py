@@ -125,6 +125,13 @@ CLOSED: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "edges.early": lambda t: 1 + 0 * t,
     "edges.x": lambda t: t,
     "bigLoop.z[1]": big_loop,
+    "pivots.x": lambda t: e(-t),
+    "pivots.y[4]": lambda t: 4 * e(-t),
+    "leaving.f": lambda t: np.where(2 * t > 1, 2, 3),
+    "leaving.c": lambda t: np.where(2 * t > 1, 10, 20),
+    "simplified.y": lambda t: -2 + 0 * t,
+    "noLoss.x": lambda t: e(-2 * t),
+    "held.x": lambda t: np.where(t < 0.5, t, 2 * t - 0.5),
 }
 AT_THE_END = {
     "bouncingBall.n": 2,
@@ -164,7 +171,12 @@ def test_equals_the_closed_form(result: np.ndarray, name: str) -> None:
     expected = CLOSED[name](t)
     scale = max(1.0, float(np.max(np.abs(expected))))
     near_jump = np.zeros(len(t), dtype=bool)
-    for jump in {"rounding.m": (0.25, 0.5, 0.75, 1.0), "bigLoop.z[1]": (0.5,)}.get(name, ()):
+    for jump in {
+        "rounding.m": (0.25, 0.5, 0.75, 1.0),
+        "bigLoop.z[1]": (0.5,),
+        "leaving.f": (0.5,),
+        "leaving.c": (0.5,),
+    }.get(name, ()):
         near_jump |= np.abs(t - jump) < 1e-9
     error = np.abs(result[name] - expected)[~near_jump]
     assert float(np.max(error)) < 2e-5 * scale

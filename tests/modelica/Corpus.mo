@@ -412,6 +412,78 @@ package Corpus "Small models with closed forms: what the exporter has to get rig
     end for;
   end BigLoop;
 
+  model Pivots "a loop of linear equations whose rows have to change places"
+    parameter Real p = 1;
+    Real x(start=1, fixed=true);
+    Real y[4];
+  equation
+    der(x) = -y[1];
+    p*(y[3] + y[4]) = 7*x;
+    p*(y[1] + y[4]) = 5*x;
+    p*(y[1] + y[2]) = 3*x;
+    p*(y[2] + 2*y[3]) = 8*x;
+  end Pivots;
+
+  model Leaving "return and break under conditions that are not known at export"
+    function first "Index of the first number above a limit, 0 if there is none"
+      input Real u[:];
+      input Real limit;
+      output Real y;
+    algorithm
+      y := 0;
+      for i in 1:size(u, 1) loop
+        if u[i] > limit then
+          y := i;
+          return;
+        end if;
+      end for;
+    end first;
+    function count "Numbers before the first one above a limit"
+      input Real u[:];
+      input Real limit;
+      output Real y;
+    algorithm
+      y := 0;
+      for i in 1:size(u, 1) loop
+        if u[i] > limit then
+          break;
+        end if;
+        y := y + 1;
+      end for;
+      y := 10*y;
+    end count;
+    Real f = first({time - 1, 2*time, 3}, 1);
+    Real c = count({time - 1, 2*time, 3}, 1);
+  end Leaving;
+
+  model Simplified "homotopy leads to one of three solutions"
+    Real y(start=0.1);
+  equation
+    homotopy(actual=y^3 - 4*y, simplified=y + 10) = 0;
+  end Simplified;
+
+  model NoLoss "a parameter that is 0 takes a part away"
+    parameter Real G = 0;
+    Real x(start=1, fixed=true);
+    Real v;
+    Real i;
+  equation
+    der(x) = -v - i;
+    v = 2*x;
+    if G <= 0 then
+      i = 0;
+    else
+      i = G*v;
+    end if;
+  end NoLoss;
+
+  model Held "noEvent() around a variable leaves the events of its own equation"
+    Boolean early = time < 0.5;
+    Real x(start=0, fixed=true);
+  equation
+    der(x) = noEvent(if early and not time > 0.8 then 1 else 2);
+  end Held;
+
   model All "one of each, so that one FMU tests them"
     LoopOverDerivatives loopOverDerivatives;
     RedeclaredModel redeclaredModel;
@@ -444,6 +516,11 @@ package Corpus "Small models with closed forms: what the exporter has to get rig
     Names names;
     Edges edges;
     BigLoop bigLoop;
+    Pivots pivots;
+    Leaving leaving;
+    Simplified simplified;
+    NoLoss noLoss;
+    Held held;
     annotation(experiment(StopTime=1, Tolerance=1e-8));
   end All;
 end Corpus;

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("casadi", reason="the export extra is not installed")
+ca = pytest.importorskip("casadi", reason="the export extra is not installed")
 
 from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export import causal_model
@@ -99,13 +99,50 @@ def test_parameters_that_shape_the_equations_are_fixed_at_export(tmp_path: Path)
     assert model.states == ("x[1]", "x[2]")
 
 
-def test_a_homotopy_between_branches_is_a_named_doubt(tmp_path: Path) -> None:
+def test_a_homotopy_makes_no_difference_while_the_model_runs(tmp_path: Path) -> None:
     file = tmp_path / "M.mo"
     file.write_text(
         "model M Real x(start=1, fixed=true); Real y = homotopy(actual=if x > 2 then 2 else x, simplified=0);\n"
         "Real z = homotopy(2*x, x); equation der(x) = -x; end M;",
         encoding="utf-8",
     )
-    with pytest.warns(UserWarning, match=r"M.mo:1: homotopy\(\) is taken as its actual value") as caught:
+    model = causal_model(str(file), tmp_path / "none")
+    assert not {"homotopy()"} & {
+        str(s) for part in (model.rhs, model.w, model.initial) for s in ca.symvar(part)
+    }
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("model M Real u = sin(time); Real y(start=-1); equation "
+         "y = noEvent(if 10*(u + y) > 1 then 1 elseif 10*(u + y) < -1 then -1 else 10*(u + y)); end M;",
+         "the loop of y has several solutions at once"),
+        ("model M Real x = true; end M;", "of x = true, one side is a Boolean, the other a number"),
+        ("operator record V Real x; encapsulated operator function '+' input V a; input V b; output V c; "
+         "algorithm c.x := a.x; end '+'; end V; model M V a(x=1); V b(x=2); V c = a + b; end M;",
+         r"the operator \+ on the record V is a limit"),
+        ("model M parameter Real t0(fixed=false); discrete Real y(start=0); initial equation t0 = time; "
+         "equation when sample(t0, 0.1) then y = time; end when; end M;",
+         r"a sample\(\) whose times the initial equations determine"),
+        ("model M parameter Real m = 0; Real x(start=1, fixed=true); Real y; equation der(x) = -x; m*y = x; end M;",
+         "singular with the parameters as they are: y cannot be solved from"),
+    ],
+    ids=["several solutions", "types", "operator record", "sample from the start", "zero coefficient"],
+)  # fmt: skip
+def test_what_would_be_wrong_is_refused_by_name(tmp_path: Path, source: str, said: str) -> None:
+    file = tmp_path / "M.mo"
+    file.write_text(source, encoding="utf-8")
+    with pytest.raises(ModelicaError, match=said):
         causal_model(str(file), tmp_path / "none")
-    assert len(caught) == 1
+
+
+def test_what_only_a_tool_knows_is_a_named_doubt(tmp_path: Path) -> None:
+    file = tmp_path / "M.mo"
+    file.write_text(
+        "model M Real x(start=1, fixed=true); discrete Real y(start=0, fixed=true); equation der(x) = -x; "
+        "when terminal() then y = x; end when; end M;",
+        encoding="utf-8",
+    )
+    with pytest.warns(UserWarning, match=r"M.mo:1: terminal\(\) is taken as false"):
+        causal_model(str(file), tmp_path / "none")

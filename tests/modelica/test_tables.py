@@ -73,6 +73,14 @@ def test_outside_the_end_points_are_held_or_their_slopes_go_on(smoothness):
     np.testing.assert_allclose(curve(smoothness, LAST_TWO, OUTSIDE), expected, rtol=1e-12)
 
 
+@pytest.mark.parametrize("smoothness", [LINEAR, CONSTANT])
+def test_a_periodic_table_repeats(smoothness):
+    period, u = X[-1] - X[0], INSIDE[:-1] + 1e-3
+    inside = curve(smoothness, LAST_TWO, u)
+    np.testing.assert_allclose(curve(smoothness, PERIODIC, u + period), inside, atol=1e-12)
+    np.testing.assert_allclose(curve(smoothness, PERIODIC, u - 2 * period), inside, atol=1e-12)
+
+
 def test_two_points_of_one_abscissa_are_a_jump():
     u = np.array([0.5, 1.0 - 1e-9, 1.0, 1.5])
     found = curve(LINEAR, LAST_TWO, u, x=[0.0, 1.0, 1.0, 2.0], y=[0.0, 1.0, 5.0, 7.0])
@@ -82,7 +90,6 @@ def test_two_points_of_one_abscissa_are_a_jump():
 @pytest.mark.parametrize(
     ("smoothness", "extrapolation", "x", "word"),
     [
-        (LINEAR, PERIODIC, X, "periodically"),
         (LINEAR, NONE, X, "without extrapolation"),
         (4, HOLD, X, "monotone"),
         (LINEAR, HOLD, [0, 1, 0.5, 2, 3, 4], "has to rise"),

@@ -230,7 +230,8 @@ def ask(
     if scenario.kind not in kind.takes or (command != "identify" and hasattr(scenario, "stages")):
         raise ScenarioError(
             f"{scenario.path} is a scenario of kind {scenario.kind!r}:"
-            f" run 'thsa-cosim {scenario.kind} {scenario.path}'."
+            f" run 'thsa-cosim {scenario.kind} {scenario.path}', or write one of kind {command!r}"
+            + (" (thsa-cosim init --identify NAME)." if command == "identify" else ".")
         )
     if package is not None and isinstance(scenario, Scenario) and scenario.diagnose is not None:
         scenario = replace(scenario, diagnose=scenario.diagnose.model_copy(update={"package": package}))

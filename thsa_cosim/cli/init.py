@@ -30,8 +30,15 @@ if TYPE_CHECKING:
     show_default=True,
     help="The scenario to write.",
 )
-def init(fmu: Path, recordings: tuple[Path, ...], output: Path) -> None:
-    """Write a commented scenario that drives an FMU with a recording and compares.
+@click.option(
+    "--identify",
+    multiple=True,
+    metavar="NAME[=LOWER:UPPER]",
+    help="A parameter of the FMU to identify, with its bounds in the FMU's unit (default: a fifth and five times its"
+    " start value); may be repeated.",
+)
+def init(fmu: Path, recordings: tuple[Path, ...], output: Path, identify: tuple[str, ...]) -> None:
+    """Write a commented scenario that drives an FMU with a recording and compares, or identifies parameters.
 
     Columns are matched to the FMU's inputs and outputs by name, description and unit; columns without a
     match are listed in the file. The scenario runs as it is. An HTML page next to it shows the recordings as the
@@ -45,7 +52,7 @@ def init(fmu: Path, recordings: tuple[Path, ...], output: Path) -> None:
 
     if output.exists():
         raise InputError(f"{output} exists already; choose another file with -o.")
-    draft = draft_scenario(read_description(fmu), recordings, output)
+    draft = draft_scenario(read_description(fmu), recordings, output, identify)
     output.parent.mkdir(parents=True, exist_ok=True)
     output.write_text(draft.text, encoding="utf-8")
     _print(draft)
@@ -63,6 +70,11 @@ def init(fmu: Path, recordings: tuple[Path, ...], output: Path) -> None:
         click.echo(
             f"{output} is not ready: nothing drives {names}, so the model stays at rest; name the column under"
             f" [recordings.columns.{draft.undriven[0].name}] unless it is constant."
+        )
+        return
+    if identify:
+        click.echo(
+            f"{output} is ready: thsa-cosim check {output} --sensitivity, then thsa-cosim identify {output}"
         )
         return
     click.echo(f"{output} is ready: thsa-cosim simulate {output}")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from thsa_cosim.draft.match import Match, match_columns
+from thsa_cosim.errors import ParameterError, did_you_mean
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.recordings.columns import FoundColumn, find_columns, time_column, unused_columns
 from thsa_cosim.units import same_dimension
@@ -41,8 +42,10 @@ class Draft:
         return tuple(v for v in (*self.constant, *still) if not _is_temperature(v) and not _is_load(v))
 
 
-def draft_scenario(fmu: FmuDescription, recordings: Sequence[Path], target: Path) -> Draft:
-    """Draft a scenario of kind "simulate" for an FMU and recordings that share their columns.
+def draft_scenario(
+    fmu: FmuDescription, recordings: Sequence[Path], target: Path, identify: Sequence[str] = ()
+) -> Draft:
+    """Draft a scenario for an FMU and recordings that share their columns; it simulates, or identifies ``identify``.
 
     Parameters
     ----------
@@ -50,14 +53,19 @@ def draft_scenario(fmu: FmuDescription, recordings: Sequence[Path], target: Path
         Files of one format; the first is looked into.
     target
         Where the scenario will stand: its paths are relative to it.
+    identify
+        Parameters of the FMU, each ``NAME`` or ``NAME=LOWER:UPPER`` with its bounds in the FMU's unit; left out, these
+        are a fifth and five times the start value, within the FMU's own limits.
 
     Raises
     ------
     RecordingError
         If the first recording cannot be read, or holds no column of numbers.
+    ParameterError
+        If ``identify`` names no parameter, or gives no bounds that could be searched.
     """
     found = find_columns(recordings[0])
-    return draft_from_columns(fmu, found, recordings, target, unused_columns(recordings[0], found))
+    return draft_from_columns(fmu, found, recordings, target, unused_columns(recordings[0], found), identify)
 
 
 def draft_from_columns(
@@ -66,6 +74,7 @@ def draft_from_columns(
     recordings: Sequence[Path],
     target: Path,
     unused: Mapping[str, str] | None = None,
+    identify: Sequence[str] = (),
 ) -> Draft:
     """Draft as :func:`draft_scenario`, from columns that were found."""
     columns = [column for column in columns if _is_name(column.name)]
@@ -81,7 +90,7 @@ def draft_from_columns(
     unmatched_columns = tuple(c for c in rest if c.name not in used)
     temperature = next((m for m in matches if m.variable in inputs and _is_temperature(m.variable)), None)
     parts = [
-        _head(fmu, recordings, target),
+        _head(fmu, recordings, target, bool(identify)),
         _time(time),
         *(_signal(match, match is temperature) for match in matches),
         *(_constant(variable) for variable in constant),
@@ -89,20 +98,27 @@ def draft_from_columns(
         _temperature(temperature),
         _fixed(fmu),
         _simulation(fmu),
-        _identify(fmu),
+        "\n".join(_parameter(fmu, asked) for asked in identify) or _identify(fmu),
     ]
     text = "\n".join(part for part in parts if part)
     return Draft(text, matches, constant, unmatched_columns, unmatched_outputs, unused or {})
 
 
-def _head(fmu: FmuDescription, recordings: Sequence[Path], target: Path) -> str:
+def _head(fmu: FmuDescription, recordings: Sequence[Path], target: Path, identifies: bool) -> str:
     listed = ", ".join(_quoted(_relative(path, target)) for path in recordings)
+    kind = "identify" if identifies else "simulate"
+    what = "simulates the FMU once per recording and compares"
+    end = "See at the end for what to change to identify parameters."
+    title = "simulated against measured"
+    if identifies:
+        what, end = "identifies the parameters at its end", "Look at their bounds first."
+        title = "parameters from recordings"
     return f"""\
-# A first scenario for {_plain(fmu.path.name)}, drafted by thsa-cosim init. It simulates the FMU once per recording and
-# compares: thsa-cosim simulate {_plain(target.name)}
-# docs/scenario.md lists every key. See at the end for what to change to identify parameters.
-kind = "simulate"
-title = {_quoted(f"{fmu.model_name}: simulated against measured")}
+# A first scenario for {_plain(fmu.path.name)}, drafted by thsa-cosim init. It {what}:
+# thsa-cosim {kind} {_plain(target.name)}
+# docs/scenario.md lists every key. {end}
+kind = {_quoted(kind)}
+title = {_quoted(f"{fmu.model_name}: {title}")}
 fmu = {_quoted(_relative(fmu.path, target))}
 
 [recordings]
@@ -227,6 +243,48 @@ def _identify(fmu: FmuDescription) -> str:
 # upper = {_number(high)}
 # scale = "linear"         # or "log", for bounds that span decades
 """
+
+
+def _parameter(fmu: FmuDescription, asked: str) -> str:
+    """A ``[[parameters]]`` table for ``NAME`` or ``NAME=LOWER:UPPER``."""
+    name, _, bounds = asked.partition("=")
+    known = {v.name: v for v in fmu.parameters if v.is_float and not v.is_array}
+    if name not in known:
+        raise ParameterError(f"{fmu.path} has no parameter {name!r} to identify.{did_you_mean(name, known)}")
+    variable = known[name]
+    low, high = _bounds(variable, bounds, fmu.path)
+    scale = "log" if low > 0.0 and high > 20.0 * low else "linear"
+    about = f"# {_about(variable)}\n" if _about(variable) else ""
+    return f"""\
+{about}[[parameters]]
+name = {_quoted(re.sub(r"[^A-Za-z0-9_]+", "_", name))}
+variable = {_quoted(name)}
+unit = {_quoted(variable.unit or "1")}
+lower = {low:.9g}
+upper = {high:.9g}
+scale = {_quoted(scale)}         # "log" for bounds that span decades
+"""
+
+
+def _bounds(variable: Variable, asked: str, path: Path) -> tuple[float, float]:
+    start = float(variable.start or 0.0)
+    low, high = sorted((0.2 * start, 5.0 * start))
+    if asked:
+        try:
+            low, high = (float(part) for part in asked.split(":"))
+        except ValueError:
+            raise ParameterError(
+                f"The bounds {asked!r} of {variable.name!r} are not LOWER:UPPER, such as 0.1:5."
+            ) from None
+    else:
+        low = low if variable.minimum is None else max(low, variable.minimum)
+        high = high if variable.maximum is None else min(high, variable.maximum)
+    if not (low < high and math.isfinite(low) and math.isfinite(high)):
+        raise ParameterError(
+            f"{path}: {variable.name!r} starts at {start:g}, which gives no bounds to search; add them as"
+            f" {variable.name}=LOWER:UPPER."
+        )
+    return low, high
 
 
 def _is_name(name: str) -> bool:

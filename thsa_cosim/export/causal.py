@@ -9,9 +9,10 @@ from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export.discrete import referenced, split_discrete
 from thsa_cosim.export.domain import with_domains
 from thsa_cosim.export.expression import Translator
-from thsa_cosim.export.solve import Block, EquationSystem
+from thsa_cosim.export.solve import HOMOTOPY, Block, EquationSystem
+from thsa_cosim.export.uniqueness import several_solutions
 from thsa_cosim.modelica.flat import Assertion, FlatEquation, FlatModel, FlatVariable
-from thsa_cosim.modelica.terms import Scalar, Term, plain, substitute, text
+from thsa_cosim.modelica.terms import Scalar, Term, make, plain, substitute, text, walk
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,7 @@ class CausalModel:
     g_start: ca.SX = field(
         default_factory=lambda: ca.SX(0, 1)
     )  # g at the guesses, where the initial values need modes
+    g_simplified: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # where homotopy() leads to
     assertions: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     domain: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # nonzero where a function leaves its domain
     domain_texts: tuple[str, ...] = ()
@@ -134,7 +136,7 @@ class _Builder:
         for variable in flat.variables.values():
             self._sort(variable)
         self.translator.discrete = frozenset(v.name for v in (*self.parameters, *self.dependents))
-        self.system = EquationSystem(self.time, frozenset(v.name for v in self.inputs))
+        self.system = EquationSystem(self.time, frozenset(v.name for v in self.inputs), self._parameter)
 
     def _sort(self, variable: FlatVariable) -> None:
         name, symbols = variable.name, self.symbols
@@ -203,6 +205,11 @@ class _Builder:
                 return True
         return False
 
+    def _parameter(self, name: str) -> float | None:
+        """Default value of a parameter that a symbol stands for; None for what is no parameter, or found initially."""
+        known = {v.name for v in (*self.parameters, *self.dependents)}
+        return self._value(name) if name in known else None
+
     def _value(self, name: str, pending: tuple[str, ...] = ()) -> float:
         """Default value of a parameter or constant."""
         if name not in self.values:
@@ -240,11 +247,16 @@ class _Builder:
         for variable in self.unknowns:
             system.add_variable(variable.name, self.symbols[variable.name], self._preference(variable))
         for equation in self.split.equations:
-            system.add_equation(self._translated(equation), str(equation), equation.place)
+            row = system.add_equation(self._translated(equation), str(equation), equation.place)
+            self._simplify(row, equation)
         for variable in self.unknowns:
             if variable.binding is not None:
-                bound = self._at(variable.place, Term("-", (Term("ref", (variable.name,)), variable.binding)))
-                system.add_equation(bound, f"{variable.name} = {text(variable.binding)}", variable.place)
+                reference = Term("ref", (variable.name,))
+                bound = self._at(variable.place, Term("-", (reference, variable.binding)))
+                row = system.add_equation(
+                    bound, f"{variable.name} = {text(variable.binding)}", variable.place
+                )
+                self._simplify(row, FlatEquation(reference, variable.binding, variable.place))
         dependent = self._dependent_values()
         initial_equations = [(self._translated(e), str(e)) for e in self.split.initial_equations]
         self._updates()
@@ -259,6 +271,13 @@ class _Builder:
                     system.derivative(variable.name)
         states = system.prepare(self.flat.name)
         solution = system.solve(self.flat.name)
+        for block in system.blocks:
+            if several_solutions(block, self._parameter):
+                raise ModelicaError(
+                    f"{self.flat.name}: the loop of {', '.join(block.names[:4])} has several solutions at once "
+                    "(positive feedback through noEvent()), of which the exporter cannot tell the right one; let the "
+                    "relation make events, or put a state (a capacity, a filter) into the loop."
+                )
         initial = self._initial(states, initial_equations)
         unknown = [system.symbols[n] for n in solution]
         solved = list(solution.values())
@@ -287,6 +306,7 @@ class _Builder:
             outputs=outputs,
             g=indicators,
             g_start=self._first_indicators(indicators, x, initial),
+            g_simplified=self._simplified_indicators(initial),
             dependent=dependent,
             initial=initial.x,
             events=self._events(final, x, states, reinits, initial),
@@ -316,6 +336,22 @@ class _Builder:
             return self.translator.real(equation.left) - self.translator.real(equation.right)
         except ModelicaError as error:
             raise ModelicaError(f"{equation.place}: in the equation {equation}: {error}") from error
+
+    def _simplify(self, row: int, equation: FlatEquation) -> None:
+        """Note what an equation with homotopy() is on the way from the simplified to the actual initial system."""
+        if not any(term.op == "homotopy" for term in walk((equation.left, equation.right))):
+            return
+
+        def along(term: Term) -> Scalar | None:
+            if term.op != "homotopy":
+                return None
+            actual, simplified = (make("noEvent", substitute(a, along, {})) for a in term.args)
+            return make("+", actual, make("*", Term("ref", (HOMOTOPY,)), make("-", simplified, actual)))
+
+        if HOMOTOPY not in self.symbols:
+            self.symbols[HOMOTOPY] = ca.SX.sym(HOMOTOPY)
+        sides = [substitute(side, along, {}) for side in (equation.left, equation.right)]
+        self.system.simplified[row] = self._at(equation.place, make("-", *sides))
 
     def _at(self, place: str, value: Scalar) -> ca.SX:
         try:
@@ -373,6 +409,12 @@ class _Builder:
             fresh[k] = ca.if_else(condition, value, fresh[k])
         starts = [initial.free.get(n, self._z_start(n)) for n in memory.names]
         samples = [ca.horzcat(start, interval) for start, interval, _ in memory.samples]
+        for times in samples:
+            if any(str(s) in memory.symbols() for s in ca.symvar(times)):
+                raise ModelicaError(
+                    f"{self.flat.name}: a sample() whose times the initial equations determine (as from the start of "
+                    "the simulation) is a limit of this exporter."
+                )
         return Events(
             z=tuple(memory.names),
             left=len(memory.left),
@@ -386,12 +428,24 @@ class _Builder:
     def _first_indicators(self, indicators: ca.SX, x: ca.SX, initial: "_Initial") -> ca.SX:
         """Event indicators at the start values, from which the search for the initial values sets out."""
         modes = {str(mode) for mode in self.translator.modes}
-        if not initial.blocks and not {str(s) for s in ca.symvar(initial.x)} & modes:
+        if (
+            not initial.blocks
+            and not self.system.simplified
+            and not {str(s) for s in ca.symvar(initial.x)} & modes
+        ):
             return ca.SX(0, 1)
         unknown = [b.unknown.nz[i] for b in self.system.blocks for i in range(b.unknown.numel())]
         guesses = [initial.guesses.get(n, ca.SX(0)) for b in self.system.blocks for n in b.names]
         moved = ca.substitute([indicators], [x, column(unknown)], [initial.x_start, column(guesses)])[0]
         return moved
+
+    def _simplified_indicators(self, initial: "_Initial") -> ca.SX:
+        """Event indicators where the way from the simplified initial system ends."""
+        if not self.system.simplified:
+            return ca.SX(0, 1)
+        symbols = {**self.symbols, **self.system.symbols}
+        known = [symbols[n] for n in initial.solution]
+        return ca.substitute([column(self.translator.indicators)], known, list(initial.solution.values()))[0]
 
     def _z_start(self, name: str) -> ca.SX:
         if name in self.split.starts:
@@ -477,6 +531,7 @@ class _Builder:
             y_start=column([solution[n] for b in system.blocks for n in b.names]),
             free={n: solution[n] for n in free},
             guesses=guesses,
+            solution=solution,
         )
 
 
@@ -491,6 +546,7 @@ class _Initial:
     y_start: ca.SX
     free: dict[str, ca.SX]
     guesses: dict[str, ca.SX]
+    solution: dict[str, ca.SX]
 
 
 class _Table:

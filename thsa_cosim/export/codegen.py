@@ -76,6 +76,7 @@ def config_header(model: CausalModel, model_identifier: str, token: str, toleran
         f"#define N_ENDS {model.domain.numel()}",
         f"#define N_GUESS {int(model.g_start.numel() > 0)}",
         f"#define N_IMPLICIT {model.y.numel()}",
+        f"#define N_TIMED {sum(not slope.is_zero() for slope in time_slopes(model))}",
         f"#define DEFAULT_TOLERANCE {tolerance!r}",
     ]
     tags = {"state": "X", "derivative": "DX", "input": "U", "parameter": "P", "dependent": "D"}
@@ -127,6 +128,9 @@ def model_source(model: CausalModel) -> ModelSource:
         "algebraic": outputs(w=model.w),
         "directional": outputs(ddx=directional[:n_x], dw=directional[n_x:]),
     }
+    slopes = time_slopes(model)
+    if any(not slope.is_zero() for slope in slopes):
+        rare["time_slopes"] = outputs(s=column(slopes))
     if events.used:
         rare["discrete"] = outputs(z=events.update)
     if events.reinit.numel():
@@ -163,7 +167,7 @@ def model_source(model: CausalModel) -> ModelSource:
         begin = implicit.begin(name)
         parts += _function(graph, name, listed, symbols, cached, bool(slow.inputs), before=begin)
     for name, listed in alone.items():
-        after = _after_dependent(slow, name)
+        after = _after_dependent(slow, name) + implicit.end(graph, name, symbols)
         begin = implicit.begin(name)
         parts += _function(graph, name, listed, symbols, {}, False, after=after, before=begin)
     parts.append(_tables(model))
@@ -181,6 +185,18 @@ class _Slow:
 def _symbols(name: str, size: int) -> ca.SX:
     """A column of symbols whose names no variable of a model can have."""
     return column(ca.SX.sym(f"{name}({k})") for k in range(size))
+
+
+def time_slopes(model: CausalModel) -> list[ca.SX]:
+    """dg/dt of each relation that is linear in time and depends on nothing else that varies between events; else 0."""
+    held = _parameters(model) | {model.m.nz[i].name() for i in range(model.m.numel())}
+    slopes = []
+    for k in range(model.g.numel()):
+        relation = model.g.nz[k]
+        moving = {symbol.name() for symbol in ca.symvar(relation)} - held
+        slope = ca.jacobian(relation, model.time) if moving == {model.time.name()} else ca.SX(0)
+        slopes.append(ca.SX(0) if ca.depends_on(slope, model.time) else ca.densify(slope))
+    return slopes
 
 
 def _parameters(model: CausalModel) -> frozenset[str]:
@@ -257,6 +273,7 @@ _ARGUMENTS = {
     "first_indicators": _POINT.replace("const double *x, ", "") + ", const double *x_start, double *g",
     "reinit": f"{_POINT}, double *x_new",
     "assertions": f"{_POINT}, double *a",
+    "time_slopes": f"{_POINT}, double *s",
     "samples": "const double *p, const double *d, double *s",
     "directional": f"{_POINT}, const double *sx, const double *su, const double *sp, double *ddx, double *dw",
 }

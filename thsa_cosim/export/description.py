@@ -1,11 +1,13 @@
 """``modelDescription.xml`` for FMI 2.0.4 and FMI 3.0, and ``buildDescription.xml`` for FMI 3.0 sources."""
 
+import warnings
 from collections.abc import Iterable
 from xml.etree import ElementTree as ET
 
 import casadi as ca
 
 from thsa_cosim import __version__
+from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export.causal import CausalModel, ModelVariable
 from thsa_cosim.export.codegen import first_value_references, value_reference
 from thsa_cosim.export.units import base_unit
@@ -225,7 +227,12 @@ def _units(root: ET.Element, model: CausalModel) -> None:
         return
     definitions = ET.SubElement(root, "UnitDefinitions")
     for name in names:
-        base = base_unit(name)
+        try:
+            base = base_unit(name)
+        except ModelicaError as error:  # a unit of its own, as dB: it can be shown, but not converted
+            warnings.warn(f"{model.flat.name}: {error} It is kept as it is written.", stacklevel=2)
+            ET.SubElement(definitions, "Unit", name=name)
+            continue
         attributes = {key: str(value) for key, value in base.exponents.items()}
         if base.factor != 1.0:
             attributes["factor"] = repr(base.factor)

@@ -152,6 +152,8 @@ class Translator:
             return select(condition, self.real(args[1], events), self.real(args[2], events))
         if op == "noEvent":
             return self.real(args[0], events=False)
+        if op == "homotopy":
+            return self.real(args[0], events)
         if op in ("start", "smooth"):
             return self.real(args[-1], events)
         if op in ("max", "min", "abs", "sign"):
@@ -216,7 +218,7 @@ class Translator:
                 raise ModelicaError(f"{name} depends on itself.")
             self._pending.add(name)
             try:
-                return self.real(self.inline[name], events)
+                return self.real(self.inline[name])  # the equation of a variable is outside of any noEvent()
             finally:
                 self._pending.discard(name)
         if name not in self.symbols:

@@ -4,14 +4,16 @@ The unknowns y of all blocks live at the end of the cache, so that the next solu
 R(y, v) = 0 the derivative of a function f(y, v) is f_v + f_y S, S = -R_y^-1 R_v, whose numbers are found at run time.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
 from thsa_cosim.export.causal import CausalModel, column
 from thsa_cosim.export.emit import statements
 from thsa_cosim.export.graph import Graph
-from thsa_cosim.export.solve import Block
+from thsa_cosim.export.solve import HOMOTOPY, Block
+
+STEPS = 20  # of the way from the simplified to the actual initial system
 
 _POINT = "double t, const double *x, const double *u, const double *p, const double *d, const double *m"
 
@@ -53,6 +55,9 @@ class Implicit:
                 self.symbols[block.unknown.nz[i].name()] = f"y0[{offset + i}]"
             offset += block.unknown.numel()
         self.initial_size = offset
+        self.homotopy = any(str(s) == HOMOTOPY for b in model.initial_blocks for s in ca.symvar(b.residual))
+        if self.homotopy:  # how far the system is simplified lies behind its unknowns
+            self.symbols[HOMOTOPY] = f"y0[{offset}]"
 
     def total(self, function: ca.SX, over: ca.SX, rates: ca.SX) -> ca.SX:
         """Jacobian of a function with y following."""
@@ -73,14 +78,15 @@ class Implicit:
             lines = []
             if self.initial_size:
                 lines = [
-                    f"  double y0[{self.initial_size}];",
+                    f"  double y0[{self.initial_size + self.homotopy}];",
                     "  if (solve_initial(t, u, p, d, m, x_start, y0)) return 1;",
                 ]
             if self.size:
                 lines.append("  double *v = implicit_of(d);")
                 if name == "discrete_start":
                     lines.append("  if (solve(t, x, u, p, d, m)) return 1;")
-            return [*lines, "  (void)v;"] if self.size else lines
+                lines.append("  (void)v;")
+            return lines
         if not self.size:
             return []
         lines = ["  double *v = implicit_of(d);", "  (void)v;", "  if (solve(t, x, u, p, d, m)) return 1;"]
@@ -117,8 +123,12 @@ class Implicit:
     def _residual(
         self, graph: Graph, symbols: dict[str, str], name: str, block: Block, y: str, extra: str
     ) -> list[str]:
-        """``static int name(const Point *at, double *f, double *jacobian)``."""
-        f = [(f"f[{i}]", node) for i, node in enumerate(graph.add_column(block.residual))]
+        """``static int name(const Point *at, double *f, double *jacobian)``; of a linear block f is -residual(0)."""
+        residual = block.residual
+        if block.linear:
+            zeros = ca.SX.zeros(block.unknown.numel())
+            residual = -ca.substitute([residual], [block.unknown], [zeros])[0]
+        f = [(f"f[{i}]", node) for i, node in enumerate(graph.add_column(residual))]
         matrix = ca.jacobian(block.residual, block.unknown)
         jac = [(f"jacobian[{i}]", node) for i, node in enumerate(graph.add_column(matrix))]
         lines = [
@@ -133,13 +143,21 @@ class Implicit:
         lines += statements(graph, jac, symbols, {})
         return [*lines, "  }", "  return 0;", "}", ""]
 
-    def _calls(self, blocks: tuple[Block, ...], prefix: str, y: str) -> list[str]:
+    @staticmethod
+    def _declared(blocks: tuple[Block, ...]) -> list[str]:
         largest = max(b.unknown.numel() for b in blocks)
-        lines = [f"  double work[{largest * (largest + 4)}];", f"  int pivot[{largest}];"]
-        offset = 0
+        return [f"  double work[{largest * (largest + 4)}];", f"  int pivot[{largest}];"]
+
+    @staticmethod
+    def _calls(blocks: tuple[Block, ...], prefix: str, y: str) -> list[str]:
+        lines, offset = [], 0
         for k, block in enumerate(blocks):
-            n = block.unknown.numel()
-            lines.append(f"  if (newton_solve({n}, {y} + {offset}, {prefix}{k}, &at, work, pivot)) return 1;")
+            n, part = block.unknown.numel(), f"{y} + {offset}"
+            if block.linear:
+                direct = f"{prefix}{k}(&at, {part}, work) || newton_linear({n}, 1, work, {part}, pivot)"
+                lines.append(f"  if ({direct}) return 1;")
+            else:
+                lines.append(f"  if (newton_solve({n}, {part}, {prefix}{k}, &at, work, pivot)) return 1;")
             offset += n
         return lines
 
@@ -153,6 +171,7 @@ class Implicit:
             f"static int solve({_POINT}) {{",
             "  double *v = implicit_of(d);",
             "  const Point at = {t, x, u, p, d, m, v};",
+            *self._declared(self.model.blocks),
             *self._calls(self.model.blocks, "block_", "v"),
             "  return 0;",
             "}",
@@ -178,12 +197,41 @@ class Implicit:
             "  const Point at = {t, x_start, u, p, d, m, y0};",
             "  (void)u; (void)p; (void)d; (void)m;",
             *statements(graph, first, symbols, {}),
+            *self._declared(self.model.initial_blocks),
+            *(
+                [f"  for (int k = {STEPS}; k >= 0; k--) {{", f"  y0[{self.initial_size}] = k / {STEPS}.0;"]
+                if self.homotopy
+                else []
+            ),
             *self._calls(self.model.initial_blocks, "initial_block_", "y0"),
+            *(["  }"] if self.homotopy else []),
             "  return 0;",
             "}",
             "",
         ]
         return lines
+
+    def end(self, graph: Graph, name: str, symbols: dict[str, str]) -> list[str]:
+        """The last statements of a function: relations at the end of the way from the simplified initial system."""
+        if name != "first_indicators" or not self.homotopy:
+            return []
+        found = [(f"g[{i}]", node) for i, node in enumerate(graph.add_column(self.model.g_simplified))]
+        return [
+            f"  double settled[N_M + 1], y0[{self.initial_size + 1}];",
+            "  for (int k = 0; k < N_M; k++) settled[k] = k < N_G ? (double)(g[k] > 0.0) : m[k];",
+            "  if (solve_initial(t, u, p, d, settled, x_start, y0)) return 0;",
+            "  {",
+            "  const double *m = settled;",
+            "  (void)m;",
+            *statements(graph, found, symbols, {}),
+            "  }",
+        ]
+
+    def _path(self) -> list[str]:
+        """The head of the loop from the simplified to the actual initial system."""
+        if not self.homotopy:
+            return []
+        return [f"  for (int k = {STEPS}; k >= 0; k--) {{", f"  y0[{self.initial_size}] = k / {STEPS}.0;"]
 
     def _rates(self, graph: Graph, symbols: dict[str, str]) -> list[str]:
         model, n = self.model, self.size
@@ -222,4 +270,4 @@ def _symbols(name: str, rows: int, columns: int) -> ca.SX:
 
 
 def _dense(block: Block) -> Block:
-    return Block(block.names, block.unknown, block.residual, ca.densify(block.guess))
+    return replace(block, guess=ca.densify(block.guess))

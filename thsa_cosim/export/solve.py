@@ -1,6 +1,7 @@
 """The equation system of one model: state selection, block order and symbolic solution."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -11,24 +12,33 @@ from thsa_cosim.export.structure import Incidence, blocks, match, reduce_index
 
 LARGEST_SYMBOLIC = 3
 STABILIZATION = 10.0  # 1/s
+HOMOTOPY = "homotopy()"  # name of the symbol that goes from 1 (simplified) to 0 (actual)
 
 
 @dataclass(frozen=True)
 class Block:
-    """Equations that are solved by Newton's method while the model runs: ``residual(unknown) = 0``."""
+    """Equations that are solved while the model runs: ``residual(unknown) = 0``, by Newton's method from the last
+    solution, or ``linear`` ones directly, which leaves no rounding noise where the solution is exactly 0.
+    """
 
     names: tuple[str, ...]
     unknown: ca.SX
     residual: ca.SX
     guess: ca.SX
+    linear: bool = False
 
 
 class EquationSystem:
     """Variables (by name) and residual equations; grows while constraints are differentiated."""
 
-    def __init__(self, time: ca.SX, inputs: frozenset[str]) -> None:
+    def __init__(
+        self, time: ca.SX, inputs: frozenset[str], parameter: Callable[[str], float | None] | None = None
+    ) -> None:
         self.time = time
         self.inputs = inputs
+        self.parameter = parameter or (
+            lambda name: None
+        )  # value of a parameter by name; None for what is none
         self.names: list[str] = []
         self.symbols: dict[str, ca.SX] = {}
         self.residuals: list[ca.SX] = []
@@ -37,6 +47,7 @@ class EquationSystem:
         self._preference: dict[str, tuple[int, ...]] = {}
         self._derivatives: dict[str, str] = {}
         self.blocks: tuple[Block, ...] = ()
+        self.simplified: dict[int, ca.SX] = {}  # residuals with homotopy, by equation; their path is HOMOTOPY
         self._full: tuple[list[ca.SX], list[str]] = ([], [])
 
     def add_variable(self, name: str, symbol: ca.SX, preference: tuple[int, ...] = (-1,)) -> int:
@@ -224,8 +235,16 @@ class EquationSystem:
                 f"{model}: nothing determines the initial value of {missing[0]}; give it a start value with fixed=true."
             )
         used = labels[len(full_labels) :]
+        for row, residual in self.simplified.items():
+            residuals[row] = residual
+            rows[row] = rows[row] | self.incidence(residual)
         solver = _Solver(self, rows, residuals, labels, model, guesses)
-        return solver.solve(matching), used, tuple(solver.blocks)
+        solution = solver.solve(matching)
+        if self.simplified:
+            path = [s for r in self.simplified.values() for s in ca.symvar(r) if str(s) == HOMOTOPY][:1]
+            final = ca.substitute(list(solution.values()), path, [ca.SX(0)] * len(path))
+            solution = dict(zip(solution, final, strict=True))
+        return solution, used, tuple(solver.blocks)
 
     def _match_rows(self, rows: Incidence) -> dict[int, int]:
         return match(rows, range(len(self.names)))
@@ -302,9 +321,10 @@ class _Solver:
         unknown = ca.vertcat(*[self.system.symbols[n] for n in names])
         matrix = ca.jacobian(residual, unknown)
         linear = not ca.depends_on(matrix, unknown)
-        if linear and matrix.is_constant() and np.linalg.matrix_rank(np.array(ca.DM(matrix))) < len(names):
+        if linear and self._singular(matrix):
+            given = "" if matrix.is_constant() else " with the parameters as they are"
             raise ModelicaError(
-                f"{self.model}: singular: {', '.join(names[:6])} cannot be solved from {listed}."
+                f"{self.model}: singular{given}: {', '.join(names[:6])} cannot be solved from {listed}."
             )
         if linear and len(names) <= LARGEST_SYMBOLIC:
             constant = ca.substitute([residual], [unknown], [ca.SX.zeros(len(names))])[0]
@@ -320,6 +340,15 @@ class _Solver:
             symbols.append(self.system.symbols[name])
             values.append(self.solution[name])
 
+    def _singular(self, matrix: ca.SX) -> bool:
+        """Whether a matrix of numbers and parameters has no inverse; False where it depends on anything else."""
+        symbols = ca.symvar(matrix)
+        values = [v for v in (self.system.parameter(str(symbol)) for symbol in symbols) if v is not None]
+        if len(values) < len(symbols):
+            return False
+        numbers = np.array(ca.evalf(ca.substitute(matrix, ca.vertcat(*symbols), ca.vertcat(*values))))
+        return not np.isfinite(numbers).all() or bool(np.linalg.matrix_rank(numbers) < len(numbers))
+
     def _reduced(self, residual: ca.SX, names: list[str], linear: bool) -> None:
         unknown = ca.vertcat(*[self.system.symbols[n] for n in names])
         if linear and len(names) <= LARGEST_SYMBOLIC:
@@ -332,7 +361,7 @@ class _Solver:
         residual = ca.substitute([residual], [unknown], [ca.vertcat(*fresh)])[0]
         self.solution.update(zip(names, fresh, strict=True))
         guess = [self.guesses.get(n, ca.SX(0)) if self.guesses else ca.SX(0) for n in names]
-        self.blocks.append(Block(tuple(names), ca.vertcat(*fresh), residual, ca.vertcat(*guess)))
+        self.blocks.append(Block(tuple(names), ca.vertcat(*fresh), residual, ca.vertcat(*guess), linear))
 
 
 def _torn(

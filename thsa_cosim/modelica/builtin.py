@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ from thsa_cosim.errors import ModelicaError, did_you_mean
 from thsa_cosim.modelica import arrays
 from thsa_cosim.modelica.arrays import Partial, Record, Value, each, elements, fill, promote, shape, total
 from thsa_cosim.modelica.syntax import Syntax
-from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, make, plain, text, walk
+from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, make, plain, text
 
 if TYPE_CHECKING:
     from thsa_cosim.modelica.evaluate import Evaluator
@@ -30,7 +29,7 @@ _REFUSED = frozenset(
     re.findall(
         r"\w+",
         """
-    delay spatialDistribution inStream actualStream terminal hold previous Clock subSample superSample
+    delay spatialDistribution inStream actualStream hold previous Clock subSample superSample
     shiftSample backSample noClock interval firstTick activeState initialState transition ticksInState
     timeInState
         """,
@@ -247,22 +246,18 @@ def _smooth(evaluator: Evaluator, expression: Syntax) -> Value:
 
 def _homotopy(evaluator: Evaluator, expression: Syntax) -> Value:
     _, arguments, named = expression.args
-    value = evaluator.value(named["actual"] if "actual" in named else arguments[0])
-    branches = any(term.op in ("if", "min", "max") for term in walk(elements(value)))
-    known = evaluator.scope.world.warned
-    place = evaluator.scope.place(expression.line)
-    if branches and place not in known:
-        known.add(place)
-        warnings.warn(
-            f"{place}: homotopy() is taken as its actual value, also while the initial values are found; where these "
-            "have several solutions, another one than with the simplified value may be found.",
-            stacklevel=2,
-        )
-    return value
+    actual = evaluator.value(named["actual"] if "actual" in named else arguments[0])
+    simplified = evaluator.value(named["simplified"] if "simplified" in named else arguments[-1])
+    return each(lambda a, b: Term("homotopy", (a, b)) if isinstance(a, Term) else a, actual, simplified)
 
 
 def _initial(evaluator: Evaluator, expression: Syntax) -> Value:
     return Term("initial", ())
+
+
+def _terminal(evaluator: Evaluator, expression: Syntax) -> Value:
+    evaluator.warn(expression, "terminal() is taken as false: an FMU does not know when its simulation ends.")
+    return False
 
 
 def _sample(evaluator: Evaluator, expression: Syntax) -> Value:
@@ -299,6 +294,13 @@ def _cardinality(evaluator: Evaluator, expression: Syntax) -> Value:
 
 def record_operator(evaluator: Evaluator, op: str, a: Value, b: Value, expression: Syntax) -> Value:
     """Operators of records: those of Complex."""
+    for value in (a, b):
+        kind_of = evaluator.scope.find_class(value.type) if isinstance(value, Record) else None
+        if kind_of is not None and kind_of.definition.name != "Complex":
+            raise evaluator.error(
+                expression,
+                f"the operator {op} on the record {kind_of.qualified} is a limit of this exporter.",
+            )
     if op in ("+", "-", ".+", ".-") and isinstance(a, Record) and isinstance(b, Record):
         return each(lambda x, y: make(op.lstrip("."), x, y), a, b)
     values = [v if isinstance(v, Record) else Record("Complex", {"re": v, "im": 0.0}) for v in (a, b)]
@@ -355,6 +357,7 @@ _TABLE: dict[str, Callable[[Any, Syntax], Value]] = {
     "smooth": _smooth,
     "homotopy": _homotopy,
     "initial": _initial,
+    "terminal": _terminal,
     "sample": _sample,
     "semiLinear": _semi_linear,
     "Integer": _to_integer,

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from thsa_cosim.errors import ModelicaError
-from thsa_cosim.modelica.arrays import Value, elements
+from thsa_cosim.modelica.arrays import elements
 from thsa_cosim.modelica.connections import Connections
 from thsa_cosim.modelica.evaluate import Evaluator
 from thsa_cosim.modelica.flat import Assertion, FlatEquation, Reinit
-from thsa_cosim.modelica.function import Statements
 from thsa_cosim.modelica.pairing import (
     assigned as assigned_names,
 )
@@ -25,6 +24,7 @@ from thsa_cosim.modelica.pairing import (
     selected,
 )
 from thsa_cosim.modelica.scope import DISABLED, Scope
+from thsa_cosim.modelica.statements import Env, Statements
 from thsa_cosim.modelica.syntax import Equation, Syntax
 from thsa_cosim.modelica.terms import Scalar, Term, make
 
@@ -126,6 +126,8 @@ class Collector:
 
     def _connect(self, equation: Equation, evaluator: Evaluator, place: str) -> None:
         nodes, inside = [], []
+        evaluator = evaluator.with_local({})
+        evaluator.connecting = True
         for side in equation.args:
             if side.op != "name":
                 raise ModelicaError(f"{place}: connect() takes the names of two connectors.")
@@ -155,7 +157,7 @@ class Collector:
         chosen: list[tuple[Scalar, list[Equation]]] = []
         last = otherwise
         for condition, body in branches:
-            value = evaluator.value(condition)
+            value = evaluator.folded(evaluator.value(condition), condition)
             if value is False:
                 continue
             if value is True:
@@ -308,13 +310,13 @@ class Collector:
 
     def _algorithm(self, section: list[Equation], evaluator: Evaluator, initial: bool) -> list[FlatEquation]:
         targets = assigned_names(section)
-        env: dict[str, Value] = {}
+        env: Env = {}
         for name in dict.fromkeys(targets):
             node = evaluator.node(Syntax("name", ((name, ()),), section[0].line))
             whole = evaluator.of_node(node, Syntax("name", ((name, ()),), section[0].line))
             env[name] = before(whole, evaluator, targets[name], initial)
         runner = _Section(self, evaluator)
-        after, _ = runner.run(section, dict(env))
+        after = runner.run(section, env)
         place = evaluator.scope.place(section[0].line)
         made = []
         for name in env:
@@ -337,18 +339,13 @@ class _Section(Statements):
     def __init__(self, collector: Collector, evaluator: Evaluator) -> None:
         super().__init__(evaluator)
         self.collector = collector
-        self.guard: Scalar = True
 
-    def run(self, statements: list[Equation], env: dict[str, Value]) -> tuple[dict[str, Value], str]:
-        for position, statement in enumerate(statements):
-            if statement.op == "when":
-                before, left = super().run(statements[:position], env)
-                if left:
-                    return before, left
-                return self.run(statements[position + 1 :], self._when(statement, before))
-        return super().run(statements, env)
+    def _statement(self, statement: Equation, env: Env) -> Any:
+        if statement.op == "when":
+            return self._when(statement, env), []
+        return super()._statement(statement, env)
 
-    def _when(self, statement: Equation, env: dict[str, Value]) -> dict[str, Value]:
+    def _when(self, statement: Equation, env: Env) -> Env:
         branches, _ = statement.args
         results = []
         outer = self.guard
@@ -356,20 +353,19 @@ class _Section(Statements):
         for condition, body in branches:
             active = edges(self._at(env).value(condition))
             self.guard = make("and", outer, make("and", active, make("not", earlier)))
-            after, _ = self.run(body, env)
-            results.append((active, after))
+            results.append((active, self.run(body, env)))
             earlier = make("or", earlier, active)
         self.guard = outer
         merged = env
         for active, after in reversed(results):
-            merged = self._merged(active, after, merged, statement)
+            merged = self._merged(active, after, merged, statement.line)
         return merged
 
-    def _at(self, env: dict[str, Value]) -> Evaluator:
+    def _at(self, env: Env) -> Evaluator:
         made = Evaluator(self.evaluator.scope, {**self.evaluator.local, **env}, False)
         return made
 
-    def _call(self, statement: Equation, env: dict[str, Value]) -> None:
+    def _call(self, statement: Equation, env: Env) -> None:
         call = statement.args[0]
         place = self.evaluator.scope.place(statement.line)
         if call.args[0] == "reinit":

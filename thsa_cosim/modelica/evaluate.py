@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -52,6 +53,7 @@ class Evaluator:
         self.scope = scope
         self.local: dict[str, Value] = dict(local or {})
         self.in_function = in_function
+        self.connecting = False  # names are those of connectors
         self.ends: list[int] = []
 
     def with_local(self, local: Mapping[str, Value]) -> Evaluator:
@@ -61,6 +63,13 @@ class Evaluator:
     def error(self, expression: Syntax, what: str) -> ModelicaError:
         """The error with file and line of an expression."""
         return ModelicaError(f"{self.scope.place(expression.line)}: {what}")
+
+    def warn(self, expression: Syntax, what: str) -> None:
+        """Warn of something at an expression, once."""
+        message = f"{self.scope.place(expression.line)}: {what}"
+        if message not in self.scope.world.warned:
+            self.scope.world.warned.add(message)
+            warnings.warn(message, stacklevel=2)
 
     def value(self, expression: Syntax) -> Value:
         """Value of an expression; raises ModelicaError, with file and line, for what is not supported."""
@@ -155,7 +164,7 @@ class Evaluator:
         branches, otherwise = expression.args
         conditions: list[tuple[Scalar, Value]] = []
         for condition, branch in branches:
-            chosen = self.value(condition)
+            chosen = self.folded(self.value(condition), condition)
             if chosen is False:
                 continue
             if chosen is True:
@@ -174,6 +183,17 @@ class Evaluator:
         for condition, branch_value in reversed(conditions):
             result = self.select(condition, branch_value, result, expression)
         return result
+
+    def folded(self, condition: Scalar, expression: Syntax) -> Scalar:
+        """A condition on parameters alone by their values, if the translation fixes what shapes the equations."""
+        if not (
+            self.scope.world.folded and isinstance(condition, Term) and self.parameters_only([condition])
+        ):
+            return condition
+        variables = self.scope.world.variables
+        if any("fixed" in variables[n].attributes for n in names(condition)):
+            return condition
+        return bool(self.fixed(condition, expression, "a condition"))
 
     def by_default(self, condition: Scalar) -> bool | None:
         """What a condition on parameters that are no Reals is before they are set; None for other conditions."""
@@ -411,6 +431,8 @@ class Evaluator:
     def _element(self, value: list[Any], index: Scalar, where: Syntax) -> Any:
         if isinstance(index, bool):
             index = int(index) + 1
+        if isinstance(index, Term) and (self.connecting or isinstance(value[0] if value else None, Scope)):
+            index = self.fixed(index, where, f"a subscript of {_written(where)}")  # which component it is
         index = plain(index)
         if isinstance(index, Term):
             return self._variable_index(value, index, where)

@@ -8,30 +8,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from thsa_cosim.errors import ModelicaError
 from thsa_cosim.modelica import builtin, tables
-from thsa_cosim.modelica.arrays import Record, Value, each, fill, shape
+from thsa_cosim.modelica.arrays import Record, Value, each, fill
 from thsa_cosim.modelica.evaluate import Evaluator
 from thsa_cosim.modelica.scope import BUILTIN_TYPES, Element, Scope, resolved
-from thsa_cosim.modelica.syntax import ClassDefinition, Component, Equation, Syntax
-from thsa_cosim.modelica.terms import Enumeration, Term, make
-
-MOST_TURNS = 100_000
-MOST_UNKNOWN = 200  # turns of a loop whose end is not known at export
-
-
-class _Unset:
-    """A variable of a function that has no value yet."""
-
-    def __repr__(self) -> str:
-        return "(no value)"
-
-
-UNSET = _Unset()
-
-
-class _Unknown(ModelicaError):
-    """The steps of a function depend on values that are not known at export."""
+from thsa_cosim.modelica.statements import UNSET, Statements, UnknownStepsError
+from thsa_cosim.modelica.syntax import Component, Syntax
+from thsa_cosim.modelica.terms import Enumeration
 
 
 def apply(evaluator: Evaluator, target: Scope, expression: Syntax) -> Value:
@@ -41,7 +24,7 @@ def apply(evaluator: Evaluator, target: Scope, expression: Syntax) -> Value:
     keyed = {name: evaluator.value(a) for name, a in named.items()}
     try:
         return invoke(evaluator, target, positional, keyed, expression)
-    except _Unknown:
+    except UnknownStepsError:
         given = [*positional, *keyed.values()]
         if not evaluator.parameters_only(given):
             raise
@@ -222,7 +205,7 @@ class _Run:
             scope = _implementation(self.target)
             statements = [s for section in scope.definition.algorithms for s in section]
             runner = Statements(Evaluator(scope, {}, True))
-            env, _ = runner.run(statements, self.env)
+            env = runner.run(statements, self.env)
         finally:
             self.caller.scope.world.__dict__["calls"].pop()
         results = tuple(env[name] for name in self.outputs)
@@ -245,238 +228,6 @@ def _names_in(expression: Any) -> set[str]:
     if isinstance(expression, tuple):
         return {n for v in expression for n in _names_in(v)}
     return set()
-
-
-class Statements:
-    """Runs statements on an environment; never changes the one it is given."""
-
-    def __init__(self, evaluator: Evaluator, asserted: Any = None) -> None:
-        self.evaluator = evaluator
-        self.asserted = asserted
-
-    def _at(self, env: dict[str, Value]) -> Evaluator:
-        made = Evaluator(self.evaluator.scope, env, self.evaluator.in_function)
-        made.local = env
-        return made
-
-    def run(self, statements: list[Equation], env: dict[str, Value]) -> tuple[dict[str, Value], str]:
-        """The environment after the statements, and "" or how they were left: "return" or "break"."""
-        env = dict(env)
-        for position, statement in enumerate(statements):
-            op = statement.op
-            if op == "assign":
-                self._assign(statement, env)
-            elif op == "call":
-                self._call(statement, env)
-            elif op == "if":
-                env, left, finished = self._if(statement, env, statements[position + 1 :])
-                if left or finished:
-                    return env, left
-            elif op == "for":
-                env, left = self._for(statement, env)
-                if left == "return":
-                    return env, left
-            elif op == "while":
-                env, left = self._while(statement, env)
-                if left == "return":
-                    return env, left
-            elif op in ("return", "break"):
-                return env, op
-            else:
-                raise self._error(statement, f"a {op} statement is a limit of this exporter here.")
-        return env, ""
-
-    def _error(self, statement: Equation, what: str) -> ModelicaError:
-        return ModelicaError(f"{self.evaluator.scope.place(statement.line)}: {what}")
-
-    def _call(self, statement: Equation, env: dict[str, Value]) -> None:
-        if self.asserted is not None:
-            self.asserted(statement, self._at(env))
-
-    def _assign(self, statement: Equation, env: dict[str, Value]) -> None:
-        left, right = statement.args
-        value = self._at(env).value(right)
-        if left.op == "tuple":
-            values = value if isinstance(value, tuple) else (value,)
-            for target, part in zip(left.args, values, strict=False):
-                if target.op != "colon":
-                    self.store(target, part, env)
-            return
-        if isinstance(value, tuple):
-            value = value[0]
-        self.store(left, value, env)
-
-    def store(self, target: Syntax, value: Value, env: dict[str, Value]) -> None:
-        """``target := value``."""
-        (name, subscripts), *rest = target.args
-        if name not in env:
-            raise self.evaluator.error(target, f"{name} cannot be assigned here.")
-        steps: list[Any] = []
-        for part, indices in ((None, subscripts), *rest):
-            if part is not None:
-                steps.append(part)
-            if indices:
-                steps.append(tuple(indices))
-        env[name] = self._placed(env[name], steps, value, target, env)
-
-    def _placed(
-        self, old: Value, steps: list[Any], value: Value, target: Syntax, env: dict[str, Value]
-    ) -> Value:
-        if not steps:
-            return value
-        first, rest = steps[0], steps[1:]
-        if isinstance(first, str):
-            if not isinstance(old, Record):
-                raise self.evaluator.error(target, f"there is no field {first} to assign.")
-            return Record(
-                old.type, {**old.fields, first: self._placed(old.fields[first], rest, value, target, env)}
-            )
-        index, *further = first
-        inner = [tuple(further), *rest] if further else rest
-        if not isinstance(old, list):
-            raise self.evaluator.error(target, "an array without a size is assigned element by element.")
-        evaluator = self._at(env)
-        evaluator.ends.append(len(old))
-        chosen = list(range(1, len(old) + 1)) if index.op == "colon" else evaluator.value(index)
-        new = list(old)
-        if isinstance(chosen, list):
-            for k, i in enumerate(chosen):
-                new[i - 1] = self._placed(old[i - 1], inner, value[k], target, env)
-        elif isinstance(chosen, Term):
-            for k in range(len(old)):
-                here = make("noEvent", make("==", chosen, k + 1))
-                put = self._placed(old[k], inner, value, target, env)
-                new[k] = each(lambda a, b, c=here: make("if", c, a, b), put, old[k])
-        else:
-            if not 1 <= chosen <= len(old):
-                raise self.evaluator.error(target, f"the subscript {chosen} is not in 1:{len(old)}.")
-            new[chosen - 1] = self._placed(old[chosen - 1], inner, value, target, env)
-        return new
-
-    def _if(
-        self, statement: Equation, env: dict[str, Value], rest: list[Equation]
-    ) -> tuple[dict[str, Value], str, bool]:
-        branches, otherwise = statement.args
-        open_branches: list[tuple[Any, list[Equation]]] = []
-        last = otherwise
-        for condition, body in branches:
-            chosen = self._at(env).value(condition)
-            if chosen is False:
-                continue
-            if chosen is True:
-                last = body
-                break
-            open_branches.append((chosen, body))
-        if not open_branches:
-            after, left = self.run(last, env)
-            return after, left, False
-        bodies = [body for _, body in open_branches] + [last]
-        leaves = any(_leaves(body) for body in bodies)
-        results = []
-        for body in bodies:
-            after, left = self.run(body, env)
-            if left == "break":
-                raise self._error(
-                    statement, "a break under a condition unknown at export is a limit of this exporter."
-                )
-            if leaves and not left:
-                after, left = self.run(rest, after)
-            results.append(after)
-        merged = results[-1]
-        for (condition, _), result in zip(reversed(open_branches), reversed(results[:-1]), strict=True):
-            merged = self._merged(condition, result, merged, statement)
-        return merged, "return" if leaves else "", leaves
-
-    def _merged(
-        self, condition: Any, yes: dict[str, Value], no: dict[str, Value], statement: Equation
-    ) -> dict[str, Value]:
-        merged = {}
-        for name in no:
-            a, b = yes.get(name, UNSET), no[name]
-            merged[name] = a if a is b else self._select(condition, a, b, statement)
-        return merged
-
-    def _select(self, condition: Any, a: Value, b: Value, statement: Equation) -> Value:
-        if a is UNSET or b is UNSET:
-            return b if a is UNSET else a
-        if isinstance(a, tuple):
-            return tuple(self._select(condition, x, y, statement) for x, y in zip(a, b, strict=True))
-        if shape(a) != shape(b):
-            raise self._error(
-                statement, "branches that give an array different sizes are a limit of this exporter."
-            )
-
-        def choose(x: Any, y: Any) -> Any:
-            if x is UNSET or y is UNSET:
-                return y if x is UNSET else x
-            return make("if", condition, x, y)
-
-        return each(choose, a, b)
-
-    def _for(self, statement: Equation, env: dict[str, Value]) -> tuple[dict[str, Value], str]:
-        iterators, body = statement.args
-        return self._loop(list(iterators), body, env, statement)
-
-    def _loop(
-        self, iterators: list[Any], body: list[Equation], env: dict[str, Value], statement: Equation
-    ) -> tuple[dict[str, Value], str]:
-        if not iterators:
-            return self.run(body, env)
-        (name, values), *rest = iterators
-        hidden = env.get(name, UNSET)
-        where = Syntax("number", (0,), statement.line)
-        for value in self._at(env).iterated(name, values, where):
-            env, left = self._loop(rest, body, {**env, name: value}, statement)
-            if left == "break":
-                break
-            if left == "return":
-                return env, left
-        env = dict(env)
-        env.pop(name, None)
-        if hidden is not UNSET:
-            env[name] = hidden
-        return env, ""
-
-    def _while(
-        self, statement: Equation, env: dict[str, Value], unknown: int = 0
-    ) -> tuple[dict[str, Value], str]:
-        """Turns run at export; after one whose condition is unknown, the loop goes on as a branch of its own."""
-        condition, body = statement.args
-        for _ in range(MOST_TURNS):
-            chosen = self._at(env).value(condition)
-            if not isinstance(chosen, Term) and not chosen:
-                return env, ""
-            if unknown + isinstance(chosen, Term) > MOST_UNKNOWN:
-                place = self.evaluator.scope.place(statement.line)
-                raise _Unknown(
-                    f"{place}: a while loop on a condition unknown at export is a limit of this exporter."
-                )
-            after, left = self.run(body, env)
-            if isinstance(chosen, Term):
-                if left == "return":
-                    raise self._error(
-                        statement, "a return out of such a while loop is a limit of this exporter."
-                    )
-                if left != "break":
-                    after, _ = self._while(statement, after, unknown + 1)
-                return self._merged(chosen, after, env, statement), ""
-            env = after
-            if left == "break":
-                return env, ""
-            if left:
-                return env, left
-        raise self._error(statement, f"a while loop runs more than {MOST_TURNS} times.")
-
-
-def _leaves(statements: list[Equation]) -> bool:
-    for statement in statements:
-        if statement.op == "return":
-            return True
-        if statement.op == "if":
-            branches, otherwise = statement.args
-            if _leaves(otherwise) or any(_leaves(body) for _, body in branches):
-                return True
-    return False
 
 
 class _External:
@@ -511,4 +262,4 @@ class _External:
         )
 
 
-__all__ = ["ClassDefinition", "Statements", "apply", "invoke"]
+__all__ = ["apply", "invoke"]

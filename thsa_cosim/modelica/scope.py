@@ -73,7 +73,7 @@ class World:
     structural: set[str] = field(default_factory=set)
     tunable: set[str] = field(default_factory=set)  # Boolean and Integer parameters that stay open
     folded: bool = False  # none of them does
-    warned: set[str] = field(default_factory=set)  # places that a warning has named
+    warned: set[str] = field(default_factory=set)  # texts of warnings given
     definitions: dict[int, Scope] = field(default_factory=dict)
 
     def top(self, name: str) -> Scope | None:

@@ -119,8 +119,6 @@ def interpolate(
     events: bool = False,
 ) -> Scalar:
     """y(u) through the points; two points of one x are a jump."""
-    if table.extrapolation == PERIODIC:
-        raise evaluator.error(where, "a table that repeats periodically is a limit of this exporter.")
     if table.extrapolation == NONE:
         raise evaluator.error(
             where, "a table without extrapolation is a limit of this exporter; choose HoldLastPoint."
@@ -131,6 +129,10 @@ def interpolate(
         raise evaluator.error(where, "the first column of the table has to rise.")
     if len(x) == 1:
         return y[0]
+    if table.extrapolation == PERIODIC:
+        period = x[-1] - x[0]
+        turns = make("floor", make("/", make("-", u, x[0]), period))
+        u = make("-", u, make("*", period, turns if events else make("noEvent", turns)))
     slopes = [
         make("/", make("-", y[k + 1], y[k]), x[k + 1] - x[k]) if x[k + 1] > x[k] else 0.0
         for k in range(len(x) - 1)

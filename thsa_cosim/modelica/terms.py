@@ -23,8 +23,8 @@ class Term:
     """An operation on values; ``op`` is one of
 
     ``ref`` (a variable's name), ``der``, ``pre`` (a term), ``+ - * / ^ neg``, ``< <= > >= == <>``, ``and or not``,
-    ``if`` (condition, value, otherwise), ``noEvent``, ``smooth`` (order, value), ``initial``, ``sample``
-    (start, interval), ``edge``, ``change`` or the name of a built-in function.
+    ``if`` (condition, value, otherwise), ``noEvent``, ``smooth`` (order, value), ``homotopy`` (actual, simplified),
+    ``initial``, ``sample`` (start, interval), ``edge``, ``change`` or the name of a built-in function.
     """
 
     __slots__ = ("args", "op")
@@ -141,6 +141,8 @@ def _simplified(op: str, args: tuple[Scalar, ...]) -> Scalar | None:
         if a is True or b is True:
             return True
         return b if a is False else a if b is False else None
+    if op == "noEvent" and not isinstance(args[0], Term):
+        return args[0]
     if op == "not" and isinstance(args[0], Term) and args[0].op == "not":
         return args[0].args[0]
     if op == "if":

@@ -10,9 +10,10 @@ _BOOLEAN = frozenset(
     ("and", "or", "not", "<", "<=", ">", ">=", "==", "<>", "edge", "change", "initial", "sample")
 )
 _LOGICAL = frozenset(("and", "or", "not", "edge"))
-_NUMERIC = frozenset(("+", "-", "*", "/", "^", "neg", "<", "<=", ">", ">=", "der", "sqrt", "exp", "log", "sin", "cos",
-                      "tan", "abs", "sign", "min", "max"))  # fmt: skip
-_THROUGH = frozenset(("pre", "noEvent", "start", "smooth"))
+_ALIKE = frozenset(("<", "<=", ">", ">=", "==", "<>", "min", "max"))  # false < true
+_NUMERIC = frozenset(("+", "-", "*", "/", "^", "neg", "der", "sqrt", "exp", "log", "sin", "cos",
+                      "tan", "abs", "sign"))  # fmt: skip
+_THROUGH = frozenset(("pre", "noEvent", "start", "smooth", "homotopy"))
 
 
 def check_types(flat: FlatModel) -> None:
@@ -21,9 +22,11 @@ def check_types(flat: FlatModel) -> None:
     for equation in (*flat.equations, *flat.initial_equations):
         checker.check(equation.left, equation.place)
         checker.check(equation.right, equation.place)
+        checker.agree(equation.left, equation.right, equation.place)
     for variable in flat.variables.values():
         if variable.binding is not None:
             checker.check(variable.binding, variable.place)
+            checker.agree(Term("ref", (variable.name,)), variable.binding, variable.place)
     for reinit in flat.reinits:
         checker.check(reinit.value, reinit.place)
 
@@ -32,12 +35,22 @@ class _Checker:
     def __init__(self, flat: FlatModel) -> None:
         self.flat = flat
         self.known: dict[int, bool | None] = {}
+        self._kept: list[Scalar] = []  # what is known by its id has to stay alive
 
     def boolean(self, value: Scalar) -> bool | None:
         """Whether a value is a Boolean; None where that is not known."""
         if not isinstance(value, Term):
             return isinstance(value, bool) if not isinstance(value, (str, Enumeration)) else False
         return self.known.get(id(value))
+
+    def agree(self, left: Scalar, right: Scalar, place: str) -> None:
+        """Refuse a number that is set equal to a Boolean."""
+        self._kept.append(left)
+        self.check(left, place)
+        if {self.boolean(left), self.boolean(right)} == {True, False}:
+            raise ModelicaError(
+                f"{place}: of {text(left)} = {text(right)}, one side is a Boolean, the other a number."
+            )
 
     def check(self, root: Scalar, place: str) -> None:
         """Check a value from its leaves up."""
@@ -63,6 +76,12 @@ class _Checker:
             self._all(args, False, term, place)
         elif op in _LOGICAL:
             self._all(args, True, term, place)
+        elif op in _ALIKE:
+            kinds = {self.boolean(a) for a in args}
+            if {True, False} <= kinds:
+                raise ModelicaError(f"{place}: {text(term)} compares a Boolean with a number.")
+            if op in ("min", "max"):
+                return True if True in kinds else False if False in kinds else None
         elif op == "if":
             self._all(args[:1], True, term, place)
             kinds = {self.boolean(args[1]), self.boolean(args[2])}

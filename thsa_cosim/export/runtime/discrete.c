@@ -12,6 +12,8 @@
 
 #define POINT s->now.time, s->now.x, s->now.u, s->p, s->d, s->now.m
 
+double discrete_grain(double time) { return 1e-12 * fmax(1.0, fabs(time)); }
+
 #if N_EVENTS
 
 enum { MOST_ITERATIONS = 1000 };
@@ -103,8 +105,6 @@ static Status iterate(Instance *c, int *jumped) {
     return give_up(c, "the event iteration does not settle");
 }
 
-static double grain(double time) { return 1e-12 * fmax(1.0, fabs(time)); }
-
 /* Sets the ticks of the samples that are due and moves their next time on. */
 static int tick(Instance *c) {
     State *s = &c->s;
@@ -114,7 +114,7 @@ static int tick(Instance *c) {
     model_samples(s->p, s->d, table);
     for (int k = 0; k < N_T; k++) {
         const double start = table[2 * k], interval = table[2 * k + 1];
-        if (s->now.next[k] > s->now.time + grain(s->now.time)) continue;
+        if (s->now.next[k] > s->now.time + discrete_grain(s->now.time)) continue;
         ticks_of(c)[k] = 1.0;
         due++;
         const double count = interval > 0.0 ? floor((s->now.time - start) / interval + 1e-6) + 1.0 : 0.0;
@@ -132,12 +132,12 @@ static void first_ticks(Instance *c) {
     for (int k = 0; k < N_T; k++) {
         const double start = table[2 * k], interval = table[2 * k + 1], behind = s->now.time - start;
         s->now.next[k] = start;
-        if (behind > grain(s->now.time) && interval > 0.0)
+        if (behind > discrete_grain(s->now.time) && interval > 0.0)
             s->now.next[k] = start + ceil(behind / interval - 1e-9) * interval;
     }
 }
 
-double discrete_next(const Instance *c) {
+static double next_tick(const Instance *c) {
     double next = DBL_MAX;
     for (int k = 0; k < N_T; k++) next = fmin(next, c->s.now.next[k]);
     return next;
@@ -187,7 +187,7 @@ Status discrete_started(Instance *c) {
 
 #else
 
-double discrete_next(const Instance *c) {
+static double next_tick(const Instance *c) {
     (void)c;
     return DBL_MAX;
 }
@@ -199,13 +199,43 @@ Status discrete_update(Instance *c) {
 
 #endif
 
+void discrete_slopes(Instance *c) {
+#if N_TIMED
+    const State *s = &c->s;
+    const int failed = model_time_slopes(POINT, c->slope);
+    for (int k = 0; k < N_G; k++)
+        if (failed || !is_finite(c->slope[k])) c->slope[k] = 0.0;
+#else
+    (void)c;
+#endif
+}
+
+/* The first instant at which a relation of time alone changes: g > 0 ends where g is 0 and begins just behind it. */
+static double next_relation(Instance *c) {
+    double next = DBL_MAX;
+    if (!N_TIMED || instance_indicators(c) != OK) return next;
+    const double time = c->s.now.time, grain = discrete_grain(time);
+    discrete_slopes(c);
+    for (int k = 0; k < N_G; k++) {
+        const int holds = c->s.now.m[k] > 0.5;
+        if (!(holds ? c->slope[k] < 0.0 : c->slope[k] > 0.0)) continue;
+        const double zero = time - c->g[k] / c->slope[k], at = holds ? zero : zero + 2.0 * discrete_grain(zero);
+        if (at > time + grain) next = fmin(next, at);
+    }
+    return next;
+}
+
+double discrete_next(Instance *c) { return fmin(next_tick(c), next_relation(c)); }
+
 Status discrete_advance(Instance *c, double end) {
     State *s = &c->s;
     while (s->now.time < end && !c->return_early) {
         const double next = discrete_next(c);
         const Status status = solver_advance(c, next < end ? next : end);
         if (status != OK) return status;
-        if (next <= s->now.time && instance_update_modes(c) != OK) return DISCARD;
+        if (next > s->now.time + discrete_grain(s->now.time)) continue;
+        s->now.bends = 1;
+        if (instance_update_modes(c) != OK) return DISCARD;
     }
     return OK;
 }

@@ -127,7 +127,8 @@ Status instance_setup(Instance *c, int tolerance_defined, double tolerance, doub
 }
 
 double instance_dead_band(const Instance *c, int k) {
-    return fmax(1e-13 * c->s.now.span[k] + DBL_MIN, c->s.now.band[k]);
+    const double late = N_TIMED ? 4.0 * discrete_grain(c->s.now.time) * fabs(c->slope[k]) : 0.0; /* discrete.c steps there */
+    return fmax(1e-13 * c->s.now.span[k] + DBL_MIN, c->s.now.band[k]) + late;
 }
 
 /* A relation that each branch drives back (sliding along g = 0) changes for ever at the pace of rounding noise. Its dead
@@ -173,13 +174,17 @@ static Status update_dependent(Instance *c) {
     return OK;
 }
 
-/* m := (g > 0) where g has come to the far side of the dead band, so that no indicator is 0 afterwards; returns the number of relations that changed. */
+/* m := (g > 0) where g has come to the far side of the dead band, so that no indicator is 0 afterwards; a time event is met
+ * at its very instant. Returns the number of relations that changed. */
 int instance_switch_modes(Instance *c, int report) {
     Motion *now = &c->s.now;
+    const double grain = discrete_grain(now->time);
     int changed = 0;
+    discrete_slopes(c);
     for (int k = 0; k < N_G; k++) {
         const double band = instance_dead_band(c, k);
-        const double wanted = c->g[k] >= band ? 1.0 : c->g[k] <= -band || c->g[k] == 0.0 ? 0.0 : now->m[k];
+        double wanted = c->g[k] >= band ? 1.0 : c->g[k] <= -band || c->g[k] == 0.0 ? 0.0 : now->m[k];
+        if (N_TIMED && c->slope[k] != 0.0) wanted = c->g[k] > grain * fabs(c->slope[k]) ? 1.0 : 0.0; /* its instant is met */
         now->span[k] = fmax(now->span[k], fabs(c->g[k]));
         if (wanted == now->m[k]) continue;
         now->m[k] = wanted;

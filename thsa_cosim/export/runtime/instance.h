@@ -37,6 +37,7 @@ typedef struct {
     int returns[N_G + 1];    /* times in a row that it changed back before g had left the band */
     int caught[N_G + 1];     /* the same with the widest band, since the time that follows */
     double since[N_G + 1];
+    int bends;               /* a time event was just met: the next step is a careful one */
     int endless;             /* 1 + the relation that changes too often to go on, else 0 */
 } Motion;
 
@@ -72,6 +73,7 @@ struct Instance {
     /* caches: valid for the present (time, x, u, p, m) */
     int dx_valid, y_valid, w_valid, g_valid;
     double dx[N_X + 1], w[N_W + 1], g[N_G + 1];
+    double slope[N_G + 1];   /* dg/dt of time events, 0 of other relations; as of the last event */
 
     /* solver workspace, nothing in it outlives a change of the point except through its validity flags */
     int jacobian_valid, factors_of; /* factors_of: index of the Jacobian that lu holds, -1 = none */
@@ -82,7 +84,7 @@ struct Instance {
     double lu[N_X * N_X + 1];
     int pivot[N_X + 1], order[N_X + 1];
     double entry[N_X * N_X + 1]; /* of lu beside the diagonal, without zeros: solver.c, compress */
-    int row[N_X * N_X + 1], lower[N_X + 1], upper[N_X + 1];
+    int from[N_X * N_X + 1], to[N_X * N_X + 1], lower, entries;
     double stage[RODAS_STAGES][N_X + 1];
     double x_new[N_X + 1];
     long events, steps, rejected;

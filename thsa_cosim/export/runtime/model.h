@@ -26,6 +26,9 @@
 #define N_GUESS 0 /* 1: the initial values depend on relations */
 #define N_IMPLICIT 0 /* unknowns of implicit equations, kept at the end of the cache */
 #endif
+#ifndef N_TIMED
+#define N_TIMED 0 /* relations of time alone, linear in it: time events */
+#endif
 #define N_M (N_G + (N_EVENTS ? 2 * N_Z + N_T + 1 : 0)) /* modes, z, pre(z), ticks, initial */
 
 #if N_X < 0 || N_U < 0 || N_P < 0 || N_D < 0 || N_W < 0 || N_Y > N_W || N_G < 0
@@ -53,6 +56,7 @@ int model_discrete_start(MODEL_POINT, const double *x_start, double *z); /* thei
 int model_first_indicators(double t, const double *u, const double *p, const double *d, const double *m,
                            const double *x_start, double *g); /* relations at the start values */
 int model_reinit(MODEL_POINT, double *x_new);         /* states after an event */
+int model_time_slopes(MODEL_POINT, double *s);        /* dg/dt of relations that are time events, 0 of the others */
 int model_samples(const double *p, const double *d, double *s); /* start and interval of each sample */
 int model_assertions(MODEL_POINT, double *a);       /* nonzero where violated */
 extern const char *const model_assertion_text[];

@@ -76,19 +76,22 @@ static int factorize(double *restrict w, int *restrict pivot) {
                 w[j * N_X + best] = swap;
             }
         const double inverse = 1.0 / col[k];
+        int below[N_X], n = 0;
         col[k] = inverse;
-        for (int i = k + 1; i < N_X; i++) col[i] *= inverse;
-        for (int j = k + 1; j < N_X; j++) {
+        for (int i = k + 1; i < N_X; i++)
+            if (col[i] != 0.0) col[i] *= inverse, below[n++] = i;
+        for (int j = k + 1; n && j < N_X; j++) {
             double *restrict right = w + j * N_X;
             const double factor = right[k];
             if (factor == 0.0) continue;
-            for (int i = k + 1; i < N_X; i++) right[i] -= factor * col[i];
+            for (int e = 0; e < n; e++) right[below[e]] -= factor * col[below[e]];
         }
     }
     return 0;
 }
 
-/* The factors' entries that are not 0, column by column: first those of L, then those of U; the swaps as one order. */
+/* P W = L D U: the entries of L and U beside the diagonal that are not 0, in the order in which they are used, U's rows over
+ * the diagonal D; the swaps as one order. One flat loop over few entries beats nested ones over all. */
 static void compress(Instance *c) {
     int n = 0;
     for (int k = 0; k < N_X; k++) c->order[k] = k;
@@ -97,29 +100,26 @@ static void compress(Instance *c) {
         c->order[k] = c->order[c->pivot[k]];
         c->order[c->pivot[k]] = swap;
     }
-    for (int k = 0; k < N_X; k++) {
-        const double *col = c->lu + k * N_X;
-        c->lower[k] = n;
-        for (int i = k + 1; i < N_X; i++)
-            if (col[i] != 0.0) c->row[n] = i, c->entry[n++] = col[i];
-        c->upper[k] = n;
-        for (int i = 0; i < k; i++)
-            if (col[i] != 0.0) c->row[n] = i, c->entry[n++] = col[i];
-    }
-    c->lower[N_X] = n;
+    for (int k = 0; k < N_X; k++)
+        for (int i = k + 1; i < N_X; i++) {
+            const double value = c->lu[k * N_X + i];
+            if (value != 0.0) c->entry[n] = value, c->from[n] = k, c->to[n++] = i;
+        }
+    c->lower = n;
+    for (int k = N_X - 1; k >= 0; k--)
+        for (int i = 0; i < k; i++) {
+            const double value = c->lu[k * N_X + i];
+            if (value != 0.0) c->entry[n] = value * c->lu[i * (N_X + 1)], c->from[n] = k, c->to[n++] = i;
+        }
+    c->entries = n;
 }
 
 static void solve(const Instance *c, double *restrict b) {
     double v[N_X];
     for (int k = 0; k < N_X; k++) v[k] = b[c->order[k]];
-    for (int k = 0; k < N_X; k++) {
-        const double known = v[k];
-        for (int e = c->lower[k]; e < c->upper[k]; e++) v[c->row[e]] -= known * c->entry[e];
-    }
-    for (int k = N_X - 1; k >= 0; k--) {
-        const double known = v[k] *= c->lu[k * (N_X + 1)];
-        for (int e = c->upper[k]; e < c->lower[k + 1]; e++) v[c->row[e]] -= known * c->entry[e];
-    }
+    for (int e = 0; e < c->lower; e++) v[c->to[e]] -= v[c->from[e]] * c->entry[e];
+    for (int k = 0; k < N_X; k++) v[k] *= c->lu[k * (N_X + 1)];
+    for (int e = c->lower; e < c->entries; e++) v[c->to[e]] -= v[c->from[e]] * c->entry[e];
     for (int k = 0; k < N_X; k++) b[k] = v[k];
 }
 

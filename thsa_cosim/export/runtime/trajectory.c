@@ -96,10 +96,10 @@ static Status write_here(Instance *c, Recorder *r) {
 Status trajectory_record(Instance *c, double h, double until, int inclusive) {
     Recorder *r = c->recorder;
     Trajectory *run = r->run;
-    const double begin = c->s.now.time, per_h = 1.0 / h;
+    const double begin = c->s.now.time, per_h = 1.0 / h, late = until - discrete_grain(until); /* shows the event there */
     while (run->done < run->n_times) {
         const double time = run->times[run->done];
-        if (inclusive ? time > until : time >= until) break;
+        if (inclusive ? time > until : time >= late) break;
         solver_dense_prepare(c);
         solver_dense(c, fmin(1.0, (time - begin) * per_h), r->x);
         inputs_at(c, r, time);
@@ -118,8 +118,10 @@ double trajectory_spacing(const Instance *c) {
 static Status cross(Instance *c, double end) { return discrete_advance(c, end); }
 
 #else
-/* No states: every row is a point of its own, whose relations have to be settled. */
+/* No states: every row is a point of its own, whose relations have to be settled, after the time events before it. */
 static Status settle_at(Instance *c, double time) {
+    for (double next = discrete_next(c); next < time - discrete_grain(time); next = discrete_next(c))
+        if (discrete_advance(c, next) != OK) return DISCARD;
     inputs_at(c, c->recorder, time);
     memcpy(c->s.now.u, c->recorder->u, sizeof c->s.now.u);
     c->s.now.time = time;

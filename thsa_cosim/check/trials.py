@@ -267,10 +267,13 @@ class Trials:
             v.name: v.start for v in self._description.parameters if v.name in tried and v.start is not None
         }
         with self._runner(backend=None if many else "python") as runner:
-            *outcomes, as_declared = runner.run(
-                [*(Job("trial", {n: v}) for n, v in tried.items()), Job("trial", declared)]
+            # First in its process, as the run that it is compared with.
+            as_declared, *outcomes = runner.run(
+                [Job("trial", declared), *(Job("trial", {n: v}) for n, v in tried.items())]
             )
-        if (judged := numerics.judge_declared(self._first, as_declared)) is not None:
+        judged = numerics.judge_declared(self._first, as_declared)
+        repeats = any(f.name == "new process" and f.verdict is Verdict.OK for f in self.findings)
+        if judged is not None and repeats:
             self._take("declared values", judged)
         found = dict(zip(tried, outcomes, strict=True))
         self._take(name, numerics.judge_changes(self._first, found, "start values"))

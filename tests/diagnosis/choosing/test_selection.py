@@ -11,7 +11,15 @@ from thsa_cosim.diagnosis.choosing.selection import Selection, other_places, oth
 
 
 def proposal(effect: str, gain: float, place: str = "motor") -> Any:
-    candidate = SimpleNamespace(effect=SimpleNamespace(name=effect), name=f"{effect}:{place}")
+    candidate = SimpleNamespace(
+        effect=SimpleNamespace(name=effect),
+        name=f"{effect}:{place}",
+        key=f"{effect}:{place}/x",
+        slot=SimpleNamespace(name=place),
+        component=effect,
+        coefficients=(None,),
+        shapes=(),
+    )
     return SimpleNamespace(candidate=candidate, gain=gain, label=f"{effect}:{place}")
 
 
@@ -57,7 +65,9 @@ def test_ripples_at_other_wave_numbers_are_those_that_promise_a_tenth_of_the_bes
 N = 4000
 TIME = np.arange(N) * 5e-3
 CHANNEL = SimpleNamespace(name="v", measured=np.zeros(N), time=TIME, noise=1.0, weight=1.0)
-TRIALS: Any = (SimpleNamespace(case=SimpleNamespace(channels=(CHANNEL,))),)
+TRIALS: Any = (
+    SimpleNamespace(case=SimpleNamespace(channels=(CHANNEL,), measured=SimpleNamespace(units={"v": "m/s"}))),
+)
 SMOOTH = 10.0 * np.sin(TIME)
 NOISE = np.random.default_rng(8).standard_normal(N)
 HELD = SMOOTH + NOISE
@@ -79,12 +89,143 @@ def selection(monkeypatch: pytest.MonkeyPatch) -> Selection:
     monkeypatch.setattr(room, "polish", lambda bench, one, current, held: one)
     monkeypatch.setattr(room, "go_on", lambda bench, one, current, held: one)
     bench: Any = SimpleNamespace(of=lambda part: TRIALS)
-    nothing: Any = None
-    return Selection(bench, nothing, nothing, HELD)
+    weights: Any = SimpleNamespace(base_held=HELD, plain=lambda residual, part: residual, left=lambda _: 1.0)
+    current: Any = SimpleNamespace()
+    return Selection(bench, weights, current, HELD)
+
+
+class Fits:
+    """Stands for `score`: the gain of each candidate's fit, and the structure that it leaves."""
+
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, selection: Selection, **made: tuple[float, float]
+    ) -> None:
+        self.made, self.tried, self.continued, self.left = made, [], [], {}  # type: ignore[var-annotated]
+        self.selection = selection
+        monkeypatch.setattr(room, "score", self.score)
+        monkeypatch.setattr(room, "go_on", self.go_on)
+        monkeypatch.setattr(selection.weights, "left", lambda validate: self.left[id(validate)])
+
+    def score(self, bench: Any, current: Any, held: Any, own: Any) -> Any:
+        assert (bench, current) == (self.selection.bench, self.selection.current)
+        assert held is self.selection.held
+        name = own.candidate.effect.name
+        self.tried.append(f"{name}{own.gain:g}")
+        if name not in self.made:
+            return None
+        gain, left = self.made[name]
+        found = SimpleNamespace(
+            proposal=own, candidate=own.candidate, validate=NOISE.copy(), fit_gain=gain, held_out_gain=gain
+        )
+        self.left[id(found.validate)] = left
+        return found
+
+    def go_on(self, bench: Any, one: Any, *_: Any) -> Any:
+        self.continued.append(one.candidate.effect.name)
+        return one
 
 
 def names(found: tuple[Any, ...]) -> list[str]:
     return [s.candidate.name for s in found]
+
+
+LEAST = room.SMALLEST_STRUCTURE**2
+
+
+@pytest.mark.parametrize(
+    ("gain", "left", "tried"),
+    [
+        (100.0, 0.99 * LEAST, ["a100", "c31", "d30"]),  # solved: 30 % of its gain, or it is no rival
+        (200.0, 0.99 * LEAST, ["a100"]),  # its gain is what it is, not what was promised,
+        (50.0, 0.99 * LEAST, ["a100", "c31", "d30"]),  # or what was promised, if that is more
+        (100.0, LEAST, ["a100", "b29", "c31", "d30"]),
+        (100.0, 0.15, ["a100", "b29", "c31", "d30"]),  # there is more to explain
+    ],
+)
+def test_once_an_effect_leaves_nothing_only_what_promises_nearly_as_much_is_refined(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch, gain: float, left: float, tried: list[str]
+):
+    fits = Fits(monkeypatch, selection, a=(gain, left))
+    promised = [proposal(name, g) for name, g in (("a", 100.0), ("b", 29.0), ("c", 31.0), ("d", 30.0))]
+    selection.refined(promised, 17.0)
+    assert fits.tried == tried
+
+
+def test_of_two_that_leave_nothing_the_better_one_sets_the_bar(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    fits = Fits(monkeypatch, selection, a=(100.0, 0.0), b=(40.0, 0.0))
+    selection.refined([proposal("a", 100.0), proposal("b", 40.0), proposal("c", 29.0)], 17.0)
+    assert fits.tried == ["a100", "b40"]
+    little = Fits(monkeypatch, selection)
+    assert selection.refined([proposal("a", 0.2)], 0.1) == []
+    assert little.tried == ["a0.2"]
+
+
+def test_those_that_come_near_the_best_in_two_iterations_are_refined_further_and_the_best_comes_first(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    fits = Fits(monkeypatch, selection, a=(30.0, 1.0), b=(100.0, 1.0), c=(31.0, 1.0))
+    found = selection.refined([proposal("a", 90.0), proposal("b", 80.0), proposal("c", 70.0)], 17.0)
+    assert fits.continued == ["b", "c"]
+    assert names(tuple(found)) == ["b:motor", "c:motor", "a:motor"]
+
+
+def test_the_simpler_form_comes_first_if_it_explains_as_much(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    Fits(monkeypatch, selection, a=(100.0, 1.0))
+    full, simple = proposal("a", 90.0), proposal("a", 80.0)
+    full.candidate.coefficients = (None, None)
+    assert [s.proposal for s in selection.refined([full, simple], 17.0)] == [simple, full]
+    assert [s.proposal for s in selection.refined_further([], [full, simple], [], 17.0)] == []
+    better = proposal("a", 100.0)
+    better.candidate.key = simple.candidate.key = "a:motor/y"
+    first = selection.refined([full], 17.0)
+    assert [s.proposal for s in selection.refined_further(first, [full, simple], [better], 17.0)] == [
+        better,
+        full,
+    ]
+
+
+def test_further_starts_are_refined_that_promise_more_than_all_before(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    fits = Fits(monkeypatch, selection, a=(100.0, 1.0), c=(50.0, 1.0))
+    before = [proposal("a", 100.0), proposal("a", 50.0), proposal("b", 20.0), proposal("c", 10.0)]
+    further = [proposal("a", 105.0), proposal("a", 60.0), proposal("c", 19.0), proposal("b", 21.0)]
+    assert selection.refined_further([], before, further, 17.0)[0].candidate.name == "c:motor"
+    assert fits.tried == ["c19"]
+    ripple = proposal("d", 12.0)
+    ripple.candidate.shapes = (SimpleNamespace(scanned=True, fixed=False),)
+    selection.refined_further([], [*before, ripple], [proposal("a", 105.1), proposal("c", 19.0)], 17.0)
+    assert fits.tried[1:] == ["a105.1", "c19", "d12"]
+    small = Fits(monkeypatch, selection)
+    selection.refined_further([], [proposal("a", 0.5)], [proposal("a", 0.6)], 0.1)
+    assert small.tried == ["a0.6"]
+
+
+def test_what_is_seen_beside_an_effect_is_part_of_its_evidence(selection: Selection):
+    for left, visible in ((0.0, False), (0.5, True)):
+        one = scored("a", left)
+        one.consistency, one.share = 5.0, 1.0 - left**2
+        found = selection.evidence(one)
+        assert found.visible is visible
+        assert found.signal_share == pytest.approx(1.0 - left**2, abs=0.01)
+        assert (found.left, found.consistency, found.share) == (1.0, 5.0, one.share)
+
+
+def test_what_reaches_nine_tenths_of_the_gain_is_fitted_with_all_parameters_to_be_compared(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    polished = []
+    monkeypatch.setattr(
+        room, "polish", lambda bench, one, current, held: polished.append(one.candidate.name) or one
+    )
+    winner, just, less = scored("a", 0.0), scored("b", 0.0), scored("c", 0.0)
+    winner.held_out_gain, just.held_out_gain, less.held_out_gain = 100.0, 90.0, 89.9
+    assert names(selection.rivals(winner, [winner, just, less], ())) == ["b:motor"]
+    assert polished == ["b:motor"]
 
 
 def test_what_leaves_as_little_is_a_rival(selection: Selection):
@@ -148,6 +289,8 @@ def test_places_that_were_not_refined_are_fitted_for_the_comparison(
     tried = []
 
     def fitted(bench: Any, current: Any, held: Any, one: Any) -> Any:
+        assert (bench, current) == (selection.bench, selection.current)
+        assert held is HELD
         tried.append(one.candidate.name)
         return None if one.candidate.name == "a:nut" else scored("a", 0.0, "gear")
 

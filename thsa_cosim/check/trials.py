@@ -267,13 +267,12 @@ class Trials:
             v.name: v.start for v in self._description.parameters if v.name in tried and v.start is not None
         }
         with self._runner(backend=None if many else "python") as runner:
-            # First in its process, as the run that it is compared with.
+            jobs = [Job("trial", declared), *(Job("trial", {n: v}) for n, v in tried.items())]
             as_declared, *outcomes = runner.run(
-                [Job("trial", declared), *(Job("trial", {n: v}) for n, v in tried.items())]
-            )
-        judged = numerics.judge_declared(self._first, as_declared)
+                jobs
+            )  # the first in its process, as the one it is compared with
         repeats = any(f.name == "new process" and f.verdict is Verdict.OK for f in self.findings)
-        if judged is not None and repeats:
+        if repeats and (judged := numerics.judge_declared(self._first, as_declared)) is not None:
             self._take("declared values", judged)
         found = dict(zip(tried, outcomes, strict=True))
         self._take(name, numerics.judge_changes(self._first, found, "start values"))

@@ -37,6 +37,7 @@ NOT_RUN = {
     r"--cluster tcp://host:8786$": "needs the two above; tests/batch/test_cluster.py has them",
     r"^thsa-cosim (list|compare) studies": "about studies of the reader's own; tests/report/test_compare.py runs both",
     r"--library ": "needs a library that is not shipped; tests/export tries it with one of its own",
+    r"make_data\.py|dcpm\.toml": "needs such an FMU; tests/docs/test_modelica_library.py runs it where the library is",
     r"benchmarks/article\.py": "two minutes of studies; a nightly test of tests/benchmarks/test_article.py runs it",
     r"scenarios/(servo|cogging|cogging_speed)\.toml|^thsa-cosim identify before/": (
         "minutes of studies; a nightly test of tests/shipped/test_measured_drives.py runs it"

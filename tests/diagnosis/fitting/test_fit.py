@@ -232,3 +232,12 @@ def test_the_drawing_is_not_widened_by_what_the_recordings_leave_unexplained():
     none = Fit(free, np.ones(3), np.ones(100), np.ones((100, 3)) * [1e3, 1e3, 0.0], np.ones(3), 0.0, True)
     assert np.isinf(none.stderr()).all(), "two act only together, the third not at all"
     assert none.inflation == 1.0
+
+
+def test_a_folded_fit_keeps_its_covariance_and_no_row_a_sample():
+    jacobian = np.random.default_rng(3).standard_normal((5000, 3)) * [1.0, 1e3, 1e-3]
+    members = tuple(Unknown(n, n, "1", 1.0, np.inf, 1.0, 0.0, 9.0) for n in "abc")
+    fit = Fit(Unknowns(members), np.ones(3), np.ones(5000), jacobian, np.ones(3), 1.0, True)
+    assert fit.folded.jacobian.shape == (3, 3)
+    assert fit.folded.covariance(2.0) == pytest.approx(fit.covariance(2.0), rel=1e-10)
+    assert fit.folded.stderr() == pytest.approx(fit.stderr(), rel=1e-10)

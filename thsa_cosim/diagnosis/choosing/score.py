@@ -1,7 +1,7 @@
 """One candidate fitted together with the declared parameters, and its score on the held-out recordings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,11 @@ class Scored:
     def candidate(self) -> Candidate:
         """The candidate."""
         return self.proposal.candidate
+
+    @property
+    def folded(self) -> "Scored":
+        """The same with a `Fit.folded`: of long recordings, what is only listed must not hold a Jacobian."""
+        return replace(self, fit=self.fit.folded)
 
 
 def score(
@@ -139,6 +144,11 @@ def extended_unknowns(declared: Unknowns, accepted: Sequence[Scored]) -> Unknown
     """The declared parameters and those of the accepted effects, the latter from their own starts."""
     members = [u for s in accepted for u in unknowns_of(s.candidate, s.proposal.shapes)]
     return declared.with_members(list({u.name: u for u in members}.values()))
+
+
+def held_shapes(candidates: Sequence[Candidate]) -> dict[str, float]:
+    """The shapes that no fit changes, by FMU variable, of every candidate: for each simulation of all effects."""
+    return {p.variable: p.at_start for c in candidates for p in c.parameters if p.fixed}
 
 
 def fixed_shapes(accepted: Sequence[Scored]) -> dict[str, float]:

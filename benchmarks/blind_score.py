@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 from pathlib import Path
@@ -131,26 +131,32 @@ def _held_out(result: Mapping[str, Any]) -> float | None:
 
 
 def _covered(coefficients: Iterable[Mapping[str, Any]], found: Mapping[str, Mapping[str, Any]]) -> list[bool]:
-    """For every true coefficient with exactly one comparable estimate: is it inside value +- 1.96 stderr?
+    """For every true coefficient with exactly one comparable estimate: is it inside value +- 1.96 stderr?"""
+    return [abs(value - true) <= 1.96 * stderr for _, value, stderr, true in estimates(coefficients, found)]
+
+
+def estimates(
+    coefficients: Iterable[Mapping[str, Any]], found: Mapping[str, Mapping[str, Any]]
+) -> Iterator[tuple[str, float, float, float]]:
+    """Name, value, standard error and truth of every true coefficient with exactly one comparable estimate.
 
     Comparable is what has the same dimension and, where that leaves a choice, a name that holds a known word.
     """
-    inside = []
     for true in coefficients:
         same = {
             name: entry for name, entry in found.items() if _converted(1.0, entry, true["unit"]) is not None
         }
         if len(same) > 1:
             same = {n: e for n, e in same.items() if any(word in n.lower() for word in true["words"])}
-        if len(same) != 1 or (entry := next(iter(same.values()))).get("stderr") is None:
+        if len(same) != 1 or next(iter(same.values())).get("stderr") is None:
             continue
+        name, entry = next(iter(same.items()))
         value, stderr = (_converted(entry[key], entry, true["unit"]) for key in ("value", "stderr"))
         assert value is not None
         assert stderr is not None
         # a gain may be given as a factor or as its error
         wanted = true["value"] - 1.0 if "gain" in true["words"] and abs(value) < 0.5 else true["value"]
-        inside.append(abs(value - wanted) <= 1.96 * stderr)
-    return inside
+        yield name, value, stderr, wanted
 
 
 def _converted(value: float, entry: Mapping[str, Any], unit: str) -> float | None:

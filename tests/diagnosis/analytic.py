@@ -98,7 +98,12 @@ def candidates(*names: str) -> tuple[Candidate, ...]:
     return candidates_of([known[name] for name in names], (MOTOR, GEAR), SCALES)
 
 
-def bench(offered: tuple[Candidate, ...], true: Mapping[str, float], seed: int = 3) -> Bench:
+def bench(
+    offered: tuple[Candidate, ...],
+    true: Mapping[str, float],
+    seed: int = 3,
+    fixed: Mapping[str, float] | None = None,
+) -> Bench:
     """Recordings of a drive with the ``true`` effects, and a bench that offers candidates."""
     generator = np.random.default_rng(seed)
     drive = Drive(offered, {})
@@ -109,7 +114,7 @@ def bench(offered: tuple[Candidate, ...], true: Mapping[str, float], seed: int =
         }
         for part in PHASE
     }
-    return Bench(drive, [_trial(drive, part) for part in PHASE])  # type: ignore[arg-type]
+    return Bench(drive, [_trial(drive, part) for part in PHASE], fixed)  # type: ignore[arg-type]
 
 
 def _trial(drive: Drive, part: str) -> Trial:

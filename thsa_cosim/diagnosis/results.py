@@ -123,14 +123,39 @@ class Evidence:
 
 
 @dataclass(frozen=True)
+class Sharpened:
+    """The least certain value of an effect: its standard error, and what the experiment is expected to make of it."""
+
+    variable: str
+    before: float
+    after: float
+
+    @property
+    def ratio(self) -> float:
+        """Error after over error before."""
+        return self.after / self.before
+
+
+@dataclass(frozen=True)
 class SeparatingExperiment:
-    """The experiment that separates rivals best: ``inputs`` over time, ``distance`` in noise variances."""
+    """The next experiment: ``inputs`` over time, and what is expected of it.
+
+    ``rivals``: the accepted effect and what it is to be distinguished from; alone, ``sharpens`` says which of its
+    values. ``distance`` of the nearest rival as fitted to the present recordings, ``present`` the same in these for as
+    long a time, and ``expected``, what is left of the distance once the rival is fitted to the experiment as well: in
+    noise variances. ``separates``: whether that is enough to decide. ``reached``: lowest and highest value of every
+    output that the model expects.
+    """
 
     name: str
-    rivals: tuple[str, str]
+    rivals: tuple[str, ...]
     distance: float
     present: float
     inputs: Signals
+    expected: float = 0.0
+    separates: bool = False
+    reached: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    sharpens: Sharpened | None = None
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,10 @@ from thsa_cosim.diagnosis.catalogue.known import choose, known_effects
 from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
-from thsa_cosim.diagnosis.choosing.findings import between_rivals, found_effects, judged, values_of
+from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, values_of
 from thsa_cosim.diagnosis.choosing.orders import Machine, machine_of
-from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
+from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes, held_shapes
+from thsa_cosim.diagnosis.choosing.spread import between_models
 from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.explaining.balance import close_balances
@@ -102,7 +103,7 @@ def _diagnose(
         study.open_runner,
     )
     with study.open_runner(scenario.simulation, [t.experiment for t in driven]) as runner:
-        bench = Bench(runner, driven)
+        bench = Bench(runner, driven, held_shapes(tested.candidates))
         start = before.fit.vector
         at_start = {t.case.name: unknowns.assignments(start, t.group) for t in driven if t.part == "fit"}
         machine = machine_of(tested.slots, tested.signals_at(at_start))
@@ -184,7 +185,8 @@ class _Closing:
             )
         counts = dict(self.bench.failures)
         changed = after is not before
-        sure_before, sure_after = _sure(before), np.hypot(_sure(after), between_rivals(found, after.fit))
+        between = between_models(found, after.fit, self.bench.of("fit"))
+        sure_before, sure_after = _sure(before), np.hypot(_sure(after), between)
         for identified in (before, after) if changed else (before,):
             for reason, count in identified.failures.items():
                 counts[reason] = counts.get(reason, 0) + count
@@ -267,8 +269,9 @@ def _built(accepted: Sequence[Scored], final: Fit) -> tuple[list[Candidate], dic
 
 
 def _sure(identified: Identified) -> np.ndarray:
-    """(n,) standard errors of an identified model's unknowns."""
-    return standard_errors(identified.fit, [t for t in identified.trials if t.part == "fit"])
+    """(n,) standard errors of an identified model's unknowns, with how well the fit and its starts agree on them."""
+    own = standard_errors(identified.fit, [t for t in identified.trials if t.part == "fit"])
+    return np.asarray(np.sqrt(own**2 + identified.apart**2 + identified.fit.remaining_step**2))
 
 
 def _errors(identified: Identified) -> dict[str, Mapping[str, StructuredError]]:

@@ -320,6 +320,20 @@ class BlackBoxTable(Table):
     """Output: voltage of the motor."""
 
 
+class LimitsTable(Table):
+    """``[diagnose.limits]``: what the rig can do, for the next experiment; what is left out is what was recorded."""
+
+    time: Positive | None = None
+    """Longest experiment in s; left out: as long as the longest fit recording, at most 12 s."""
+    range: dict[Name, tuple[float, float]] = Field(default_factory=dict)
+    """Lowest and highest value of an input or output (speed, current, position, load) by FMU variable, in its unit;
+    left out: what was recorded, an output up to a fifth of its range more."""
+    rate: dict[Name, Positive] = Field(default_factory=dict)
+    """Largest change of the command or the load per s, by FMU variable, in its unit."""
+    travel: Positive | None = None
+    """Largest range of the command's integral, in its unit times s; left out: a fifth more than was recorded."""
+
+
 class DiagnoseOptionsTable(Table):
     """``[diagnose]``: the model that effects are added to, and which are tried."""
 
@@ -342,6 +356,7 @@ class DiagnoseOptionsTable(Table):
     """The input that loads the drive; a separating experiment may vary it."""
     empirical: bool = False
     """Add an empirical law to the model if a repeatable residual is left that no effect explains."""
+    limits: LimitsTable = LimitsTable()
     balances: list[BalanceTable] = Field(default_factory=list)
     blackbox: BlackBoxTable | None = None
 

@@ -170,6 +170,14 @@ def test_velocity_sensor_gain_and_delay(superset: Plant):
     np.testing.assert_allclose(delayed[smooth], np.interp(TIME - 0.008, TIME, plain)[smooth], atol=2e-6)
 
 
+def test_a_long_delay_is_one_at_every_change_of_speed(superset: Plant):
+    """Against the exact delay; two approximations of order (2, 2) in series err by 6.7e-6 m/s (rms) here."""
+    plain = run(superset, {})["v"]
+    delayed = run(superset, {"velocitySensorEffect.sensorDelay.tau": 0.03})["v"]
+    error = float(np.sqrt(np.mean((delayed - np.interp(TIME - 0.03, TIME, plain)) ** 2)))
+    assert error < 6e-6, error
+
+
 def test_backlash_is_the_width_of_the_hysteresis(superset: Plant):
     gap = 2e-4
     time = np.linspace(0.0, 4.0, 4001)
@@ -251,7 +259,14 @@ FRICTION: dict[str, tuple[dict[str, float], Law]] = {
         {"dF": 800.0, "v_S": 1e-3, "n": 2.0},
         lambda q: 800.0 * np.exp(-((q["v"] / 1e-3) ** 2)) * q["s"],
     ),
-    "motorEffect.windage": ({"b_q": 2e-5}, lambda q: 2e-5 * q["v"] ** 2 * q["s"]),
+    "motorEffect.windage": (
+        {"b_q": 2e-5, "n": 1.8, "v_r": 100.0},
+        lambda q: 2e-5 * np.abs(q["v"]) ** 1.8 * 100.0**0.2 * q["s"],
+    ),
+    "screwEffect.hessSoom": (
+        {"dF": 800.0, "v_S": 1e-3},
+        lambda q: 800.0 / (1.0 + (q["v"] / 1e-3) ** 2) * q["s"],
+    ),
     "motorEffect.cogging": (
         {"a_s": 0.02, "a_c": 0.01, "a_s2": 0.005, "a_c2": -0.004, "n": 24.0},
         lambda q: (

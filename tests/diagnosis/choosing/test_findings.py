@@ -12,7 +12,6 @@ from thsa_cosim.diagnosis.choosing.attribution import Round
 from thsa_cosim.diagnosis.choosing.chance import probability
 from thsa_cosim.diagnosis.choosing.findings import (
     NO_MORE,
-    between_rivals,
     found_effects,
     judged,
     order_of,
@@ -30,7 +29,13 @@ GAINS = np.random.default_rng(3).gumbel(5.0, 1.5, 1000)
 
 
 def parameter(variable: str, role: str = "coefficient", **more: Any) -> Any:
-    given = {"unit": "N", "typical": 1.0, "neutral": 0.0, "name": variable.rpartition(".")[2]} | more
+    given = {
+        "unit": "N",
+        "typical": 1.0,
+        "neutral": 0.0,
+        "fixed": False,
+        "name": variable.rpartition(".")[2],
+    } | more
     return SimpleNamespace(variable=variable, role=role, **given)
 
 
@@ -226,30 +231,6 @@ def test_values_are_widened_by_what_is_left_and_split_into_declared_and_effects(
     assert values_of(fit, declared=True, stderr=np.array([0.3, 0.1]))["p"].stderr == 0.3
     ended = replace(fit, vector=np.array([9.0, 4.0]))
     assert values_of(ended, declared=True)["p"].reason == "it ended at the end of its range, 9 N"
-
-
-def test_rivals_widen_the_declared_parameters_that_they_bend_and_nothing_else():
-    """0.6 apart with equal chances: the root of the mean square about the named one is 0.6/sqrt(2)."""
-    winner, rival, other = (scored(proposal(name, 90.0)) for name in "abc")
-    rival.fit = replace(rival.fit, vector=np.array([1.6, 9.0]))
-    other.fit = replace(other.fit, vector=np.array([0.4, 7.0]))
-    for rivals, apart in (((rival,), 0.6 / 2**0.5), ((rival, other), 0.6 * (2 / 3) ** 0.5), ((), 0.0)):
-        own = one_round([winner.proposal], [winner], winner, ("",), rivals)
-        found = between_rivals(attribution(own, accepted=(winner,)), winner.fit)
-        np.testing.assert_allclose(found, [apart, 0.0], atol=1e-12)
-
-
-def test_what_rivals_of_several_effects_bend_adds_up_parameter_by_parameter():
-    first, second, rival, other = (scored(proposal(name, 90.0)) for name in "abcd")
-    names = Unknowns((unknown("p", declared=True), unknown("q", declared=True)))
-    for one, vector in ((first, [1.0, 2.0]), (second, [1.0, 2.0]), (rival, [1.3, 2.0]), (other, [1.4, 2.8])):
-        one.fit = replace(one.fit, unknowns=names, vector=np.array(vector))
-    rounds = [
-        one_round([first.proposal], [first], first, ("",), (rival,)),
-        one_round([second.proposal], [second], second, ("",), (other,)),
-    ]
-    found = between_rivals(attribution(*rounds, accepted=(first, second)), second.fit)
-    np.testing.assert_allclose(found, np.sqrt([(0.3**2 + 0.4**2) / 2.0, 0.8**2 / 2.0]))
 
 
 def test_a_value_at_its_bound_unseen_or_only_known_from_the_drawing_is_not_determined():

@@ -135,7 +135,7 @@ WINDAGE = {"motorEffect.windage.b_q": 2e-3}
 
 
 def proposed(amplitude: float) -> Proposal:
-    (candidate,) = candidates("windage")
+    candidate = candidates("windage")[0]
     one = np.ones((1, 1))
     return Proposal(candidate, {}, one, 1.0, np.array([amplitude]), 1.0, one)
 

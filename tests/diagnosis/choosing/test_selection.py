@@ -79,7 +79,12 @@ def scored(effect: str, left: float, place: str = "motor") -> Any:
     gain = float(HELD @ HELD - validate @ validate)
     own = proposal(effect, gain, place)
     return SimpleNamespace(
-        proposal=own, candidate=own.candidate, validate=validate, held_out_gain=gain, fit_gain=gain
+        proposal=own,
+        candidate=own.candidate,
+        validate=validate,
+        fit=SimpleNamespace(residual=validate, cost=float(validate @ validate)),
+        held_out_gain=gain,
+        fit_gain=gain,
     )
 
 
@@ -90,7 +95,7 @@ def selection(monkeypatch: pytest.MonkeyPatch) -> Selection:
     monkeypatch.setattr(room, "go_on", lambda bench, one, current, held: one)
     bench: Any = SimpleNamespace(of=lambda part: TRIALS)
     weights: Any = SimpleNamespace(base_held=HELD, plain=lambda residual, part: residual, left=lambda _: 1.0)
-    current: Any = SimpleNamespace()
+    current: Any = SimpleNamespace(residual=HELD)
     return Selection(bench, weights, current, HELD)
 
 

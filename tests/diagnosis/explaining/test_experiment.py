@@ -14,6 +14,8 @@ from thsa_cosim.costs.channels import Channel
 from thsa_cosim.diagnosis.explaining import experiment as room
 from thsa_cosim.diagnosis.explaining.profiles import Range, input_range, profiles, travel
 from thsa_cosim.diagnosis.fitting.trials import Trial
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
+from thsa_cosim.scenario.schema import LimitsTable
 from thsa_cosim.signals import Signals
 from thsa_cosim.study import Case
 
@@ -63,32 +65,57 @@ class Rig:
             if self.broken and self.broken in job.experiment:
                 outcomes.append(Outcome(Status.CRASH, "broken", None, None, 0.0, ""))
                 continue
-            found = Signals(own.time, {"i_q": self.forces[job.values["rival"]](own)})
+            force = job.values["k"] * self.forces[job.values["rival"]](own)
+            found = Signals(own.time, {"i_q": force + job.values["c"] * np.sign(own["v_cmd"])})
             outcomes.append(Outcome(Status.OK, "", found, None, 0.0, ""))
         return outcomes
 
 
-def scored(name: str, number: float, residual: np.ndarray) -> Any:
-    unknowns = SimpleNamespace(assignments=lambda vector, group: {"rival": number})
-    fit = SimpleNamespace(unknowns=unknowns, vector=np.zeros(1), residual=residual)
-    return SimpleNamespace(candidate=SimpleNamespace(name=name, effect=SimpleNamespace(name=name)), fit=fit)
+def scored(name: str, number: float, residual: np.ndarray, known: float = 1e12) -> Any:
+    """A model whose force a job names by ``number``, and whose friction ``c`` the recordings know so well."""
+    friction = Unknown("c", "c", "A", 0.0, np.inf, 1.0, -9.0, 9.0)
+    size = Unknown("k", "k", "1", 1.0, np.inf, 1.0, -9.0, 9.0, declared=False)
+    unknowns = Unknowns((friction, size))
+    assigned = lambda vector, group: {"rival": number, "c": vector[0], "k": vector[1]}  # noqa: E731
+    fit = SimpleNamespace(
+        unknowns=SimpleNamespace(
+            assignments=assigned,
+            members=unknowns.members,
+            names=unknowns.names,
+            scale=unknowns.scale,
+            clip=unknowns.clip,
+            named=unknowns.named,
+            index=unknowns.index,
+        ),
+        vector=np.array([0.0, 1.0]),
+        residual=residual,
+        information=np.diag([known, 1e12]),
+    )
+    own = SimpleNamespace(name="k", variable="k", neutral=0.0, fixed=False)
+    candidate = SimpleNamespace(
+        name=name, effect=SimpleNamespace(name=name), parameters=(own,), coefficients=(own,)
+    )
+    return SimpleNamespace(candidate=candidate, fit=fit, proposal=SimpleNamespace(shapes={}))
 
 
 def find(monkeypatch: pytest.MonkeyPatch, other: Force, **changed: Any) -> Any:
     """The experiment between a rival without force and one with ``other``."""
     still: Force = lambda s: np.zeros(s.time.size)  # noqa: E731
-    broken = changed.pop("broken", "")
+    broken, mine, known = changed.pop("broken", ""), changed.pop("mine", still), changed.pop("known", 1e12)
+    limits = changed.pop("limits", LimitsTable())
 
     def open_runner(_: Any, experiments: Any) -> Any:
-        return Rig(experiments, {1.0: still, 2.0: other}, broken)
+        return Rig(experiments, {1.0: mine, 2.0: other}, broken)
 
     winner = scored("windage", 1.0, np.zeros(TIME.size))
-    rival = scored("stribeck:screw", 2.0, np.full(TIME.size, 0.5))
+    rival = scored("stribeck:screw", 2.0, np.full(TIME.size, 0.5), known)
     attribution = SimpleNamespace(
-        rounds=(SimpleNamespace(accepted=winner, scored=(winner, rival), rivals=(), factors=np.ones(1)),),
+        rounds=(
+            SimpleNamespace(accepted=winner, scored=(winner, rival), rivals=(rival,), factors=np.ones(1)),
+        ),
         accepted=(winner,),
     )
-    spec = SimpleNamespace(command="v_cmd", load="F_load")
+    spec = SimpleNamespace(command="v_cmd", load="F_load", limits=limits)
     given = {"found": attribution, "spec": spec} | changed
     scenario = SimpleNamespace(simulation=None)
     return room.separating_experiment(scenario, given["spec"], given["found"], [trial()], open_runner)  # type: ignore[arg-type]
@@ -115,6 +142,10 @@ def test_distances_are_in_variances_of_the_noise(monkeypatch: pytest.MonkeyPatch
     best = find(monkeypatch, loaded)
     expected = np.sum((loaded(best.inputs) / NOISE) ** 2)
     assert best.distance == pytest.approx(expected)
+    assert best.expected == pytest.approx(expected, rel=1e-3), (
+        "the recordings know too well what could imitate it"
+    )
+    assert best.separates
     # 0.5 standard deviations at every sample of the recording, for as many samples as the experiment has
     assert best.present == pytest.approx(0.25 * best.inputs.time.size)
     assert best.rivals == ("windage", "stribeck:screw")
@@ -134,7 +165,64 @@ def test_a_failed_simulation_only_costs_its_profile(monkeypatch: pytest.MonkeyPa
     assert without.distance <= whole.distance
 
 
-def test_a_tie_of_a_later_effect_is_separated_rather_than_the_first_one_from_its_runner_up(
+def dragging(inputs: Signals) -> np.ndarray:
+    """What a constant friction imitates, but at creep."""
+    return 0.5 * np.sign(inputs["v_cmd"]) + slow(inputs)
+
+
+def test_what_a_rival_imitates_once_it_is_fitted_does_not_count(monkeypatch: pytest.MonkeyPatch):
+    sure, open_ = (find(monkeypatch, dragging, known=known) for known in (1e12, 1e-6))
+    assert sure.expected == pytest.approx(sure.distance, rel=1e-3)
+    assert open_.expected < 0.5 * open_.distance
+    assert open_.expected > 36.0, "creep is left"
+    only = find(monkeypatch, lambda s: 0.5 * np.sign(s["v_cmd"]), known=1e-6)
+    assert only.expected < 1.0
+    assert not only.separates
+
+
+def test_one_law_under_two_names_is_separated_by_nothing(monkeypatch: pytest.MonkeyPatch):
+    best = find(monkeypatch, loaded, mine=loaded)
+    assert best.rivals == ("windage", "stribeck:screw")
+    assert best.expected == 0.0
+    assert not best.separates
+
+
+def test_what_separates_little_of_what_the_effect_does_is_not_counted_on(monkeypatch: pytest.MonkeyPatch):
+    """0.1 A at every sample is many standard deviations, but 2 % of what the effect does."""
+    strong: Force = lambda s: 5.0 * np.cos(s.time)  # noqa: E731
+    near = find(monkeypatch, lambda s: 4.9 * np.cos(s.time), mine=strong)
+    assert near.expected > 1000.0
+    assert not near.separates
+    assert find(monkeypatch, lambda s: 2.0 * np.cos(s.time), mine=strong).separates
+
+
+def test_it_keeps_the_rigs_limits_of_inputs_outputs_and_time(monkeypatch: pytest.MonkeyPatch):
+    limits = LimitsTable(time=4.0, range={"F_load": (0.0, 2e4), "v_cmd": (-5e-3, 5e-3)}, rate={"v_cmd": 0.01})
+    best = find(monkeypatch, loaded, limits=limits)
+    assert best.inputs.time[-1] == pytest.approx(4.0)
+    assert best.inputs["F_load"].max() <= 2e4
+    assert np.abs(best.inputs["v_cmd"]).max() <= 5e-3
+    assert best.reached["i_q"] == (0.0, 0.0), "of the accepted effect, which has no force"
+    tight = find(monkeypatch, loaded, mine=loaded, limits=LimitsTable(range={"i_q": (-0.2, 0.2)}))
+    assert max(map(abs, tight.reached["i_q"])) <= 0.2
+    assert find(monkeypatch, dragging, limits=LimitsTable(range={"i_q": (-0.4, 0.4)})) is None
+
+
+def test_an_output_stays_near_what_was_recorded(monkeypatch: pytest.MonkeyPatch):
+    own = trial()
+    (channel,) = own.case.channels
+    plan = SimpleNamespace(
+        fit=[
+            replace(own, case=replace(own.case, channels=(replace(channel, measured=np.array([-1.0, 2.0])),)))
+        ],
+        spec=SimpleNamespace(limits=LimitsTable()),
+    )
+    assert room._Plan._limits(plan, "i_q") == pytest.approx((-1.6, 2.6))  # type: ignore[arg-type]
+    plan.spec.limits = LimitsTable(range={"i_q": (-3.0, 3.0)})
+    assert room._Plan._limits(plan, "i_q") == (-3.0, 3.0)  # type: ignore[arg-type]
+
+
+def test_a_tie_of_a_later_effect_is_separated_rather_than_the_first_one_sharpened(
     monkeypatch: pytest.MonkeyPatch,
 ):
     first, runner_up = (scored(n, k, np.zeros(TIME.size)) for n, k in (("backlash", 1.0), ("cogging", 1.0)))
@@ -147,20 +235,36 @@ def test_a_tie_of_a_later_effect_is_separated_rather_than_the_first_one_from_its
     assert best.rivals == ("windage", "stribeck")
     assert best.present == pytest.approx(0.25 * best.inputs.time.size), "by the factors of its own round"
     dropped = SimpleNamespace(rounds=rounds, accepted=(first,))
-    assert find(monkeypatch, loaded, found=dropped).rivals == ("backlash", "cogging")
+    assert find(monkeypatch, loaded, found=dropped).rivals == ("backlash",)
+
+
+def test_without_a_tie_the_least_certain_value_is_made_surer(monkeypatch: pytest.MonkeyPatch):
+    """The amplitude k of a force in proportion to the load: its error falls as the squared force adds up."""
+    winner = scored("load-dependent-friction", 1.0, np.zeros(TIME.size))
+    winner.fit.information = np.diag([1e12, 25.0])
+    one = SimpleNamespace(accepted=winner, scored=(winner,), rivals=(), factors=np.ones(1))
+    found = SimpleNamespace(rounds=(one,), accepted=(winner,))
+    best = find(monkeypatch, slow, mine=loaded, found=found)
+    assert best.rivals == ("load-dependent-friction",)
+    assert best.sharpens.variable == "k"
+    assert best.sharpens.before == pytest.approx(0.2)
+    gained = np.sum((loaded(best.inputs) / NOISE) ** 2)
+    assert best.sharpens.after == pytest.approx((25.0 + gained) ** -0.5, rel=1e-3)
+    assert "at the highest load" in best.name
 
 
 def test_nothing_to_separate(monkeypatch: pytest.MonkeyPatch):
-    alone = scored("windage", 1.0, np.zeros(TIME.size))
     for rounds in (
         (),
         (SimpleNamespace(accepted=None, scored=(), rivals=()),),
-        (SimpleNamespace(accepted=alone, scored=(alone,), rivals=()),),
     ):
         accepted = tuple(r.accepted for r in rounds if r.accepted is not None)
         found = SimpleNamespace(rounds=rounds, accepted=accepted)
         assert find(monkeypatch, loaded, found=found) is None
-    assert find(monkeypatch, loaded, spec=SimpleNamespace(command=None, load="F_load")) is None
+    assert (
+        find(monkeypatch, loaded, spec=SimpleNamespace(command=None, load="F_load", limits=LimitsTable()))
+        is None
+    )
 
 
 def test_every_profile_is_one_that_the_rig_has_the_speed_load_rate_and_travel_for():

@@ -91,6 +91,7 @@ class Variant:
     ``block`` and ``interface`` are class names within ``THSA.Effects`` and ``THSA.Interfaces`` (or qualified);
     ``slots`` restricts it to slots of these names (without the ending ``Effect``), None: all of the interface.
     ``beside``: offered only once another variant of the block is in the model, as a further part of the same effect.
+    ``instead``: another form, tried in the place where the effect was accepted.
     ``law``: the block's equation, for FMUs without source (`diagnosis.blackbox`); None: not for those.
     """
 
@@ -100,6 +101,7 @@ class Variant:
     slots: tuple[str, ...] | None = None
     law: Law | None = None
     beside: bool = False
+    instead: bool = False
 
     @property
     def component(self) -> str:

@@ -6,9 +6,11 @@ effect must still be needed beside the others.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
+from thsa_cosim.diagnosis.choosing.forms import best_form
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, SMALLEST_STRUCTURE, out_of_range
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
@@ -20,6 +22,10 @@ from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
 
+#: Objections to what another form, or another effect, takes the place of.
+TAKEN = "another form of it fits better"
+APART = "explains the held-out recordings as well, but not the fit recording that distinguishes them"
+
 Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
 
 
@@ -28,8 +34,8 @@ class Round:
     """One screening: its threshold, what was proposed, what was refined (best first) and what was decided.
 
     ``objections``: why each of the first refined ones was not accepted, "" for the one that was. ``rivals``: other
-    effects that explain the held-out recordings as well as the accepted one, within the uncertainty. ``factors`` (N,):
-    how the residuals of the fit recordings were weighed.
+    effects that explain the held-out recordings as well as the accepted one, within the uncertainty; ``forms``: other
+    forms of it that do. ``factors`` (N,): how the residuals of the fit recordings were weighed.
     """
 
     threshold: float
@@ -40,6 +46,7 @@ class Round:
     rivals: tuple[Scored, ...]
     gains: FloatArray
     factors: FloatArray
+    forms: tuple[Scored, ...] = ()
 
     @property
     def folded(self) -> "Round":
@@ -189,11 +196,32 @@ def _round(
         limit = threshold(gains)
     choice, objections = selection.choose(scored, limit, not accepted, not whole)
     rivals: tuple[Scored, ...] = ()
+    forms: tuple[Scored, ...] = ()
     if choice is not None and whole:
+        first = choice
+        choice = selection.overtaking(choice, scored) or choice
+        choice, forms = best_form(selection, choice, scored, proposals, offered)
+        if choice is not first:
+            scored, objections = _taken_over(choice, scored, objections)
+        if choice.proposal not in proposals:
+            proposals = [choice.proposal, *proposals]
         scored += selection.elsewhere(choice, scored, proposals)
         rivals = selection.rivals(choice, scored, {s.candidate.effect.name for s in accepted})
     factors = selection.bench.factors("fit")
-    return Round(limit, tuple(proposals), tuple(scored), choice, objections, rivals, gains, factors)
+    return Round(limit, tuple(proposals), tuple(scored), choice, objections, rivals, gains, factors, forms)
+
+
+def _taken_over(
+    choice: Scored, scored: Sequence[Scored], objections: Sequence[str]
+) -> tuple[list[Scored], tuple[str, ...]]:
+    """What was refined, and its objections, with a better form in the first place."""
+    others = [(s, why) for s, why in zip_longest(scored, objections) if s.proposal is not choice.proposal]
+    whys = [
+        why or (TAKEN if s.candidate.name == choice.candidate.name else APART)
+        for s, why in others
+        if why is not None
+    ]
+    return [choice, *(s for s, _ in others)], ("", *whys)
 
 
 def prune(

@@ -36,24 +36,6 @@ def values_of(fit: Fit, *, declared: bool, stderr: FloatArray | None = None) -> 
     }
 
 
-def between_rivals(found: Attribution, fit: Fit) -> FloatArray:
-    """(n,) how far the unknowns of ``fit`` part between the accepted effects and their rivals, in their units.
-
-    Each of them may be the true one, and bends the declared parameters in its own way: the root of the mean square
-    over equally likely rivals. 0 for an effect's own parameters, which only mean something if it is the one.
-    """
-    variance = np.zeros(len(fit.unknowns.members))
-    declared = [k for k, u in enumerate(fit.unknowns.members) if u.declared]
-    names = [fit.unknowns.names[k] for k in declared]
-    for scored in found.accepted:
-        owner = _round_of(found, scored)
-        assert owner.accepted is not None
-        apart = [rival.fit.at(names) - owner.accepted.fit.at(names) for rival in owner.rivals]
-        if apart:
-            variance[declared] += np.sum(np.square(apart), axis=0) / (1 + len(apart))
-    return np.asarray(np.sqrt(variance))
-
-
 def undetermined(unknown: Unknown, value: float, stderr: float) -> str:
     """Why the recordings do not determine an unknown, or ""; how large an effect's parameter is says `vague`."""
     if not unknown.lower < value < unknown.upper:
@@ -154,7 +136,14 @@ def _title(scored: Scored, name: str) -> str:
 
 
 def _parameters(members: list[Scored], values: Mapping[str, Value]) -> dict[str, Value]:
-    """By name; with the slot and block where an effect acts in several ways."""
+    """By name, with slot and block where an effect acts in several ways; what is given, not fitted, has no error."""
+    given = {
+        p.variable: Value(s.proposal.shapes[p.name], p.unit, 0.0)
+        for s in members
+        for p in s.candidate.parameters
+        if p.fixed
+    }
+    values = {**values, **given}
     ways = {s.candidate.component + s.candidate.slot.name for s in members}
     return {
         p.name if len(ways) == 1 else p.variable: replace(

@@ -146,6 +146,11 @@ def extended_unknowns(declared: Unknowns, accepted: Sequence[Scored]) -> Unknown
     return declared.with_members(list({u.name: u for u in members}.values()))
 
 
+def held_shapes(candidates: Sequence[Candidate]) -> dict[str, float]:
+    """The shapes that no fit changes, by FMU variable, of every candidate: for each simulation of all effects."""
+    return {p.variable: p.at_start for c in candidates for p in c.parameters if p.fixed}
+
+
 def fixed_shapes(accepted: Sequence[Scored]) -> dict[str, float]:
     """The shapes that no fit changes, by FMU variable, at the values of the accepted proposals."""
     return {

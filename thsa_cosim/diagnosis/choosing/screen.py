@@ -96,6 +96,7 @@ def screen(
     rows = [
         (candidate, shapes)
         for candidate in candidates
+        if not candidate.variant.instead
         if not candidate.variant.beside or any(p.variable in known for p in candidate.all_parameters)
         for shapes in shape_starts(candidate, scanned, known)
     ]

@@ -1,7 +1,7 @@
 """One round of the search: what to refine, which of it to accept, and what these recordings cannot tell from that."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from thsa_cosim.diagnosis.choosing.gates import (
     SIGMAS,
@@ -29,6 +29,8 @@ from thsa_cosim.signals import FloatArray
 TIE_SHARE = 0.005
 #: ... and those that reach less than this share of it are none.
 RIVAL_SHARE = 0.9
+#: A rival that leaves this share of the gain in one of the fit recordings can be told apart there.
+APART_SHARE = 0.02
 #: How many effects are refined after each screening, if they promise at least this share of the best one's gain, and
 #: with how many starts each.
 REFINED, WORTH, STARTS = 6, 0.03, 2
@@ -116,12 +118,14 @@ class Selection:
     current: Fit
     held: FloatArray
     say: Say = lambda _: None
+    _polished: dict[int, Scored] = field(default_factory=dict)
 
     def refined(self, proposals: Sequence[Proposal], limit: float) -> list[Scored]:
         """What is worth it, fitted with the declared parameters, best on held-out recordings first."""
-        return self._fitted(worth_refining(proposals, limit))
+        return self.fitted(worth_refining(proposals, limit))
 
-    def _fitted(self, proposals: Sequence[Proposal]) -> list[Scored]:
+    def fitted(self, proposals: Sequence[Proposal]) -> list[Scored]:
+        """``proposals`` fitted with the declared parameters, best on held-out recordings first."""
         scored: list[Scored] = []
         solved = 0.0
         for proposal in proposals:
@@ -160,7 +164,7 @@ class Selection:
             before[p.candidate.key] = max(before.get(p.candidate.key, 0.0), p.gain)
         better = worth_refining([p for p in further if p.gain > BETTER * before[p.candidate.key]], limit)
         chosen = sorted([*better, *other_waves(proposals, scored)], key=lambda p: -p.gain)
-        found = sorted([*scored, *self._fitted(chosen)], key=lambda s: -s.held_out_gain)
+        found = sorted([*scored, *self.fitted(chosen)], key=lambda s: -s.held_out_gain)
         return simplest_first(found, self._ties)
 
     def evidence(self, one: Scored) -> Evidence:
@@ -228,14 +232,46 @@ class Selection:
             name = candidate.name if candidate.effect.name == effect else candidate.effect.name
             if name in (own, *rivals, *named) or other.held_out_gain < RIVAL_SHARE * winner.held_out_gain:
                 continue
-            polished = polish(self.bench, other, self.current, self.held)
-            if self._ties(polished, winner):
+            polished = self.polished(other)
+            if self._ties(polished, winner) and not self.fits_better(winner, polished):
                 rivals[name] = polished
         return tuple(rivals.values())
 
+    def overtaking(self, winner: Scored, scored: Sequence[Scored]) -> Scored | None:
+        """What explains the held-out recordings as well as the winner and fits one of the others clearly better."""
+        found = [
+            self.polished(other)
+            for other in scored
+            if other.candidate.name != winner.candidate.name
+            and other.held_out_gain >= RIVAL_SHARE * winner.held_out_gain
+        ]
+        better = [s for s in found if self._ties(s, winner) and self.fits_better(s, winner)]
+        believed = [s for s in better if not insignificant(s) and not out_of_range(s.fit)]
+        return min(believed, key=lambda s: s.fit.cost, default=None)
+
+    def fits_better(self, one: Scored, other: Scored) -> bool:
+        """Whether there is a fit recording in which the second leaves what the first explains, beyond chance."""
+        trials = self.bench.of("fit")
+        begin = 0
+        for trial in trials:
+            part = slice(begin, begin := begin + sum(c.measured.size for c in trial.case.channels))
+            base, ours, theirs = (f.residual[part] for f in (self.current, one.fit, other.fit))
+            lead = block_gains((trial,), theirs, ours)
+            gain = float(base @ base - ours @ ours)
+            if consistency(lead) >= SIGMAS and float(lead.sum()) >= max(APART_SHARE * gain, SIGMAS**2):
+                return True
+        return False
+
+    def polished(self, one: Scored) -> Scored:
+        """A candidate fitted with all parameters, once."""
+        key = id(one.proposal)
+        if key not in self._polished:
+            self._polished[key] = polish(self.bench, one, self.current, self.held)
+        return self._polished[key]
+
     def _whole(self, one: Scored) -> Scored:
         self.say(f"fitting {one.candidate.name} with all parameters")
-        return polish(self.bench, one, self.current, self.held)
+        return self.polished(one)
 
     def _go_on(self, one: Scored) -> Scored:
         return go_on(self.bench, one, self.current, self.held)

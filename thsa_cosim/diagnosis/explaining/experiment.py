@@ -1,25 +1,40 @@
-"""The experiment that would tell rivals apart: of what the rig can run, where the refitted rivals differ most.
+"""The next experiment: of what the rig can run, what distinguishes rivals, or else makes an effect's values sure.
 
-T-optimal design between rival models (A. Atkinson, V. Fedorov, Biometrika 62 (1975) 57), over a menu of profiles in
-place of a continuous design.
+A menu of profiles in place of a continuous design: each is simulated with the accepted effect and with its rivals, what
+the rig cannot do is left out, and the most promising ones are judged with the rivals fitted to them.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import islice, product
 
 import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Status
-from thsa_cosim.diagnosis.choosing.attribution import Attribution
-from thsa_cosim.diagnosis.choosing.score import Scored
-from thsa_cosim.diagnosis.explaining.profiles import Profile, input_range, profiles, travel
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round
+from thsa_cosim.diagnosis.choosing.gates import SIGMAS
+from thsa_cosim.diagnosis.choosing.score import Scored, fixed_shapes
+from thsa_cosim.diagnosis.choosing.selection import APART_SHARE
+from thsa_cosim.diagnosis.explaining.design import expected_errors, expected_gain
+from thsa_cosim.diagnosis.explaining.profiles import TRAVEL, Profile, input_range, profiles, travel
+from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.trials import Trial
-from thsa_cosim.diagnosis.results import SeparatingExperiment
+from thsa_cosim.diagnosis.results import SeparatingExperiment, Sharpened
 from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
 from thsa_cosim.signals import FloatArray, Signals
 
-#: Longest experiment that is tried, in s, and how many samples it has at most.
-_LONGEST, _SAMPLES = 12.0, 12001
+#: Longest experiment that is tried where no limit says else, in s, and how many samples it has at most.
+LONGEST, SAMPLES = 12.0, 12001
+#: An output may go this much beyond what was recorded, as a share of its range, where no limit says else.
+MARGIN = 0.2
+#: Profiles that are judged by the rivals fitted to them, the most promising first.
+JUDGED = 3
+#: Rivals that are told apart at a time.
+MOST_RIVALS = 3
+#: An expected gap this many times what the decision asks for is counted on.
+SAFETY = 2.0
+#: Difference step of an unknown, in standard errors of the present recordings.
+STEP = 3.0
 
 
 def separating_experiment(
@@ -29,98 +44,264 @@ def separating_experiment(
     trials: Sequence[Trial],
     open_runner: OpenRunner,
 ) -> SeparatingExperiment | None:
-    """The profile of ``spec.command`` and ``spec.load`` at which an effect and its rival differ most.
+    """The profile of ``spec.command`` and ``spec.load`` that says most, within the rig's limits.
 
-    ``trials`` run the model that holds all effects. The first pair that the recordings cannot distinguish counts, else
-    the first effect and its runner-up. ``distance`` is the sum over the outputs' samples of the squared difference of
-    both models, as fitted to the present recordings, in variances of the noise; ``present`` the same on the fit
-    recordings, for as long a time. The other inputs are held at what they were in the first fit recording. None
-    without an accepted effect, a second candidate or a command.
+    ``trials`` run the model that holds all effects. With a tie it is the one at which the accepted effect and its
+    rivals differ most once each rival is fitted to it; without one, that which makes the least certain value of the
+    first effect surest. The other inputs are held at what they were in the first fit recording. None without an
+    accepted effect, a command, or a profile that keeps the limits.
     """
-    pair, factors = _rivals(found)
     fit = [t for t in trials if t.part == "fit"]
-    if pair is None or spec.command is None or not fit:
-        return None
-    first = fit[0]
-    recorded = [t.case.inputs for t in fit]
-    step = float(np.median(np.diff(first.case.time)))
-    lasting = min(_LONGEST, max(float(s.time[-1] - s.time[0]) for s in recorded), _SAMPLES * step)
-    time = np.asarray(step * np.arange(int(lasting / step) + 1), dtype=np.float64)
-    menu = profiles(
-        time,
-        input_range(recorded, spec.command),
-        None if spec.load is None else input_range(recorded, spec.load),
-        travel(recorded, spec.command),
-    )
-    inputs = [_inputs(first.case.inputs, time, spec, profile) for profile in menu]
-    experiments = [replace(_experiment(first, own), name=p.name) for p, own in zip(menu, inputs, strict=True)]
-    jobs = [
-        Job(e.name, _values(scored, first.group), keep_signals=True) for e in experiments for scored in pair
-    ]
-    if not jobs:
-        return None
-    with open_runner(scenario.simulation, experiments) as runner:
-        outcomes = runner.run(jobs)
-    weights = {c.name: c.weight / c.noise**2 for c in first.case.channels}
-    best: SeparatingExperiment | None = None
-    for k, (profile, own) in enumerate(zip(menu, inputs, strict=True)):
-        one, other = outcomes[2 * k : 2 * k + 2]
-        if (
-            one.status != Status.OK
-            or other.status != Status.OK
-            or one.signals is None
-            or other.signals is None
-        ):
-            continue
-        distance = _distance(one.signals, other.signals, weights)
-        if best is None or distance > best.distance:
-            names = (pair[0].candidate.name, pair[1].candidate.name)
-            present = _present(pair, factors, fit, time.size)
-            best = SeparatingExperiment(profile.name, names, distance, present, own)
-    return best
-
-
-def _rivals(found: Attribution) -> tuple[tuple[Scored, Scored] | None, FloatArray]:
-    """An accepted effect and what the recordings cannot tell from it, else the first one and the best of the others.
-
-    And the factors (N,) that the residuals of their fits hold.
-    """
     kept = [r for r in found.rounds if r.accepted is not None and r.accepted in found.accepted]
-    for one in kept:
-        if one.rivals and one.accepted is not None:
-            return (one.accepted, one.rivals[0]), one.factors
-    for one in kept[:1]:
-        winner = one.accepted
-        others = (s for s in one.scored if s.candidate.effect.name != winner.candidate.effect.name)  # type: ignore[union-attr]
-        if winner is not None and (second := next(others, None)) is not None:
-            return (winner, second), one.factors
-    return None, np.zeros(0)
+    if spec.command is None or not fit or not kept:
+        return None
+    one = next((r for r in kept if r.rivals), kept[0])
+    assert one.accepted is not None
+    models = (one.accepted, *one.rivals[:MOST_RIVALS])
+    plan = _Plan(scenario, spec, fit, one, models, open_runner)
+    return plan.best()
 
 
-def _values(scored: Scored, group: str) -> Mapping[str, float]:
-    return scored.fit.unknowns.assignments(scored.fit.vector, group)
+@dataclass(frozen=True, eq=False)
+class _Ran:
+    """A profile with the weighted outputs (N,) of every model, and how far the outputs go."""
+
+    profile: Profile
+    inputs: Signals
+    outputs: tuple[FloatArray, ...]
+    reached: Mapping[str, tuple[float, float]]
 
 
-def _inputs(recorded: Signals, time: FloatArray, spec: DiagnoseSpec, profile: Profile) -> Signals:
-    """The recording's inputs with the profile in place of command and load, the others at their first value."""
-    values = {name: np.full(time.size, recorded[name][0]) for name in recorded.names}
-    assert spec.command is not None
-    values[spec.command] = profile.command
-    if spec.load is not None and profile.load is not None:
-        values[spec.load] = profile.load
-    return Signals(time, values, recorded.units, recorded.held - {spec.command, spec.load})
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """The search over the menu; ``models``: the accepted effect and its rivals, as fitted in ``one`` round."""
+
+    scenario: Scenario
+    spec: DiagnoseSpec
+    fit: Sequence[Trial]
+    one: Round
+    models: tuple[Scored, ...]
+    open_runner: OpenRunner
+
+    def best(self) -> SeparatingExperiment | None:
+        """The best profile of those that keep the limits."""
+        ran = self._ran()
+        if not ran:
+            return None
+        if len(self.models) == 1:
+            return self._sharpest(ran)
+        promising = sorted(ran, key=lambda r: -min(_distances(r)))[:JUDGED]
+        judged = [(self._gaps(r), r) for r in promising]
+        gaps, best = max(judged, key=lambda pair: min(pair[0]))
+        worst = int(np.argmin(gaps))
+        names = tuple(m.candidate.name for m in self.models)
+        return SeparatingExperiment(
+            best.profile.name,
+            names,
+            _distances(best)[worst],
+            self._present(worst + 1, best.inputs.time.size),
+            best.inputs,
+            expected=gaps[worst],
+            separates=gaps[worst] >= SAFETY * max(SIGMAS**2, APART_SHARE * self._effect(best)),
+            reached=best.reached,
+        )
+
+    def _ran(self) -> list[_Ran]:
+        """Every profile of the menu that all models can run within the limits."""
+        recorded, spec = [t.case.inputs for t in self.fit], self.spec
+        assert spec.command is not None
+        time = self._time()
+        limits = spec.limits
+        menu = profiles(
+            time,
+            input_range(
+                recorded, spec.command, limits.range.get(spec.command), limits.rate.get(spec.command)
+            ),
+            None
+            if spec.load is None
+            else input_range(recorded, spec.load, limits.range.get(spec.load), limits.rate.get(spec.load)),
+            TRAVEL * travel(recorded, spec.command) if limits.travel is None else limits.travel,
+        )
+        inputs = [self._inputs(time, profile) for profile in menu]
+        vectors = [m.fit.vector for m in self.models]
+        outcomes = self._run(menu, inputs, list(zip(self.models, vectors, strict=True)))
+        ran = []
+        for profile, own, signals in zip(menu, inputs, outcomes, strict=True):
+            runs = [s for s in signals if s is not None]
+            if len(runs) == len(self.models) and all(self._keeps(s) for s in runs):
+                ran.append(_Ran(profile, own, tuple(map(self._weighted, runs)), _reached(runs[0])))
+        return ran
+
+    def _time(self) -> FloatArray:
+        first = self.fit[0].case
+        step = float(np.median(np.diff(first.time)))
+        recorded = max(float(t.case.inputs.time[-1] - t.case.inputs.time[0]) for t in self.fit)
+        longest = min(LONGEST, recorded) if self.spec.limits.time is None else self.spec.limits.time
+        return np.asarray(
+            step * np.arange(int(min(longest, SAMPLES * step) / step + 1e-6) + 1), dtype=np.float64
+        )
+
+    def _run(
+        self,
+        menu: Sequence[Profile],
+        inputs: Sequence[Signals],
+        vectors: Sequence[tuple[Scored, FloatArray]],
+    ) -> list[list[Signals | None]]:
+        """The outputs of every profile (rows) under every model with its vector."""
+        first = self.fit[0]
+        experiments = [
+            replace(_experiment(first, own), name=p.name) for p, own in zip(menu, inputs, strict=True)
+        ]
+        jobs = [
+            Job(e.name, self._values(model, vector), keep_signals=True)
+            for e, (model, vector) in product(experiments, vectors)
+        ]
+        if not jobs:
+            return []
+        with self.open_runner(self.scenario.simulation, experiments) as runner:
+            outcomes = iter(runner.run(jobs))
+        return [
+            [o.signals if o.status == Status.OK else None for o in islice(outcomes, len(vectors))]
+            for _ in experiments
+        ]
+
+    def _values(self, model: Scored, vector: FloatArray) -> Mapping[str, float]:
+        return {**fixed_shapes([model]), **model.fit.unknowns.assignments(vector, self.fit[0].group)}
+
+    def _inputs(self, time: FloatArray, profile: Profile) -> Signals:
+        """The recording's inputs with the profile in place of command and load, the others at their first value."""
+        recorded = self.fit[0].case.inputs
+        values = {name: np.full(time.size, recorded[name][0]) for name in recorded.names}
+        assert self.spec.command is not None
+        values[self.spec.command] = profile.command
+        if self.spec.load is not None and profile.load is not None:
+            values[self.spec.load] = profile.load
+        return Signals(time, values, recorded.units, recorded.held - {self.spec.command, self.spec.load})
+
+    def _keeps(self, outputs: Signals) -> bool:
+        """Whether every output stays in its limits, or near what was recorded."""
+        for channel in self.fit[0].case.channels:
+            if channel.name in outputs.names:
+                low, high = self._limits(channel.name)
+                if outputs[channel.name].min() < low or outputs[channel.name].max() > high:
+                    return False
+        return True
+
+    def _limits(self, name: str) -> tuple[float, float]:
+        """Lowest and highest value of an output; what never moved in the recordings limits nothing."""
+        if name in self.spec.limits.range:
+            return self.spec.limits.range[name]
+        measured = [c.measured for t in self.fit for c in t.case.channels if c.name == name]
+        low, high = min(float(m.min()) for m in measured), max(float(m.max()) for m in measured)
+        margin = MARGIN * (high - low)
+        return (low - margin, high + margin) if margin > 0.0 else (-np.inf, np.inf)
+
+    def _factor(self, name: str) -> float:
+        """What the round weighed the residuals of a channel by."""
+        begin = 0
+        for channel in self.fit[0].case.channels:
+            if channel.name == name and self.one.factors.size > 1:
+                return float(self.one.factors[begin])
+            begin += channel.measured.size
+        return float(self.one.factors[0]) if self.one.factors.size == 1 else 1.0
+
+    def _weighted(self, outputs: Signals) -> FloatArray:
+        """(N,) all compared outputs in standard deviations of the noise, as the round weighed them."""
+        parts = [
+            outputs[c.name] * (self._factor(c.name) * np.sqrt(c.weight) / c.noise)
+            for c in self.fit[0].case.channels
+        ]
+        return np.concatenate(parts)
+
+    def _jacobian(self, ran: _Ran, number: int) -> FloatArray | None:
+        """(N, n) of a model's outputs in a profile per scale of each unknown; None if that cannot be simulated."""
+        model, fit = self.models[number], self.models[number].fit
+        moved = _stepped(fit)
+        (signals,) = self._run([ran.profile], [ran.inputs], [(model, vector) for vector in moved])
+        found = np.zeros((ran.outputs[number].size, len(moved)))
+        for k, (own, vector) in enumerate(zip(signals, moved, strict=True)):
+            taken = (vector[k] - fit.vector[k]) / fit.unknowns.scale[k]
+            if own is None or taken == 0.0:
+                return None
+            found[:, k] = (self._weighted(own) - ran.outputs[number]) / taken
+        return found
+
+    def _gaps(self, ran: _Ran) -> list[float]:
+        """Expected gap to every rival, fitted, if the accepted effect is the true one."""
+        gaps = []
+        for number in range(1, len(self.models)):
+            jacobian = self._jacobian(ran, number)
+            difference = ran.outputs[0] - ran.outputs[number]
+            information = self.models[number].fit.information
+            gaps.append(0.0 if jacobian is None else expected_gain(information, jacobian, difference))
+        return gaps
+
+    def _effect(self, ran: _Ran) -> float:
+        """What the accepted effect does in a profile beyond what the declared parameters can imitate."""
+        jacobian = self._jacobian(ran, 0)
+        if jacobian is None:
+            return 0.0
+        model, fit = self.models[0], self.models[0].fit
+        own = {p.variable: p.neutral for p in model.candidate.coefficients}
+        values = fit.unknowns.named(fit.vector)
+        without = np.array([own.get(name, values[name]) for name in fit.unknowns.names])
+        (signals,) = self._run([ran.profile], [ran.inputs], [(model, without)])
+        if signals[0] is None:
+            return 0.0
+        declared = [k for k, u in enumerate(fit.unknowns.members) if u.name not in own and u.declared]
+        difference = ran.outputs[0] - self._weighted(signals[0])
+        return expected_gain(fit.information[np.ix_(declared, declared)], jacobian[:, declared], difference)
+
+    def _present(self, number: int, samples: int) -> float:
+        """Distance to a rival on the fit recordings, scaled to ``samples`` of every output."""
+        apart = (self.models[0].fit.residual - self.models[number].fit.residual) / self.one.factors
+        recorded = sum(t.case.channels[0].measured.size for t in self.fit)
+        return float(apart @ apart) * samples / recorded
+
+    def _sharpest(self, ran: Sequence[_Ran]) -> SeparatingExperiment | None:
+        """The profile that leaves the least certain value of the effect surest."""
+        model, fit = self.models[0], self.models[0].fit
+        own = [p.variable for p in model.candidate.parameters if p.variable in fit.unknowns.names]
+        index = fit.unknowns.index(own)
+        best: SeparatingExperiment | None = None
+        for one in sorted(ran, key=lambda r: -_moved(r, self))[:JUDGED]:
+            jacobian = self._jacobian(one, 0)
+            if jacobian is None:
+                continue
+            before, after = (e * fit.unknowns.scale for e in expected_errors(fit.information, jacobian))
+            size = np.maximum(np.abs(fit.vector[index]), np.finfo(float).tiny)
+            worst = index[int(np.argmax(before[index] / size))]
+            sharpened = Sharpened(fit.unknowns.names[worst], float(before[worst]), float(after[worst]))
+            if best is None or best.sharpens is None or sharpened.ratio < best.sharpens.ratio:
+                best = SeparatingExperiment(
+                    one.profile.name, (model.candidate.name,), 0.0, 0.0, one.inputs,
+                    separates=False, reached=one.reached, sharpens=sharpened,
+                )  # fmt: skip
+        return best
+
+
+def _moved(ran: _Ran, plan: _Plan) -> float:
+    """How much moves in a profile: what excites little teaches little."""
+    return float(np.sum(np.diff(ran.outputs[0]) ** 2))
+
+
+def _stepped(fit: Fit) -> list[FloatArray]:
+    """The fitted vector with each unknown moved by some standard errors, off its bounds."""
+    errors = np.sqrt(np.diag(np.linalg.pinv(fit.information, hermitian=True)))
+    steps = np.clip(STEP * errors, 1e-6, 0.1) * fit.unknowns.scale
+    ahead = [fit.unknowns.clip(fit.vector + row) for row in np.diag(steps)]
+    back = [fit.unknowns.clip(fit.vector - row) for row in np.diag(steps)]
+    return [a if a[k] != fit.vector[k] else b for k, (a, b) in enumerate(zip(ahead, back, strict=True))]
+
+
+def _distances(ran: _Ran) -> list[float]:
+    """Squared distance of the first model's outputs from every other one's, as fitted to the present recordings."""
+    return [float(np.sum((ran.outputs[0] - other) ** 2)) for other in ran.outputs[1:]]
+
+
+def _reached(outputs: Signals) -> dict[str, tuple[float, float]]:
+    return {n: (float(outputs[n].min()), float(outputs[n].max())) for n in outputs.names}
 
 
 def _experiment(trial: Trial, inputs: Signals) -> Experiment:
     return replace(trial.case, inputs=inputs, time=inputs.time).experiment(trial.name, None)
-
-
-def _distance(one: Signals, other: Signals, weights: Mapping[str, float]) -> float:
-    return float(sum(w * np.sum((one[n] - other[n]) ** 2) for n, w in weights.items()))
-
-
-def _present(pair: tuple[Scored, Scored], factors: FloatArray, fit: Sequence[Trial], samples: int) -> float:
-    """Distance of both on the fit recordings, scaled to ``samples`` of every output."""
-    difference = (pair[0].fit.residual - pair[1].fit.residual) / factors
-    recorded = sum(t.case.channels[0].measured.size for t in fit)
-    return float(difference @ difference) * samples / recorded

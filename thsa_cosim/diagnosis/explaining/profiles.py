@@ -7,8 +7,8 @@ import numpy as np
 
 from thsa_cosim.signals import FloatArray, Signals
 
-#: A profile may travel this much further than the recordings did (integral of the command).
-_TRAVEL = 1.2
+#: A profile may travel this much further than the recordings did (integral of the command), where no limit says else.
+TRAVEL = 1.2
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,17 @@ class Profile:
     load: FloatArray | None
 
 
-def input_range(recordings: Sequence[Signals], name: str) -> Range:
-    """What an input did in ``recordings``."""
+def input_range(
+    recordings: Sequence[Signals],
+    name: str,
+    limits: tuple[float, float] | None = None,
+    rate: float | None = None,
+) -> Range:
+    """What an input did in ``recordings``, or may do by ``limits`` (lowest, highest) and a ``rate`` per s."""
     values = np.concatenate([r[name] for r in recordings])
-    rate = max(float(np.max(np.abs(np.diff(r[name]) / np.diff(r.time)))) for r in recordings)
-    return Range(float(values.min()), float(values.max()), rate)
+    low, high = (float(values.min()), float(values.max())) if limits is None else limits
+    did = max(float(np.max(np.abs(np.diff(r[name]) / np.diff(r.time)))) for r in recordings)
+    return Range(low, high, did if rate is None else rate)
 
 
 def travel(recordings: Sequence[Signals], name: str) -> float:
@@ -48,11 +54,11 @@ def travel(recordings: Sequence[Signals], name: str) -> float:
 
 
 def profiles(time: FloatArray, command: Range, load: Range | None, limit: float) -> tuple[Profile, ...]:
-    """Every profile of the menu over ``time`` (n,) whose integrated command keeps within ``limit`` (and a margin)."""
+    """Every profile of the menu over ``time`` (n,) whose integrated command keeps within ``limit``."""
     menu = _menu(_Grid(time, command.rate), command.reach)
     found: list[Profile] = []
     for name, values in menu:
-        if _travel(time, values) > _TRAVEL * limit:
+        if _travel(time, values) > limit:
             continue
         for words, course in _loads(time, load):
             found.append(Profile(name + words, values, course))

@@ -62,6 +62,15 @@ class Fit:
         """Mean squared residual in variances of the noise, at least 1: how much less the recordings say for it."""
         return max(1.0, self.misfit / self.residual.size)
 
+    @property
+    def remaining_step(self) -> FloatArray:
+        """(n,) how far the optimum still is by Gauss-Newton, in the unknowns' units; 0 for one that its bound holds."""
+        unknowns, scale = self.unknowns, self.unknowns.scale
+        pull = self.jacobian.T @ self.residual + unknowns.prior(self.vector) * unknowns.precision * scale
+        inverse = self.covariance()
+        step = -np.where(np.isfinite(inverse), inverse, 0.0) @ pull * scale
+        return np.asarray(unknowns.clip(self.vector + step) - self.vector)
+
     def covariance(self, inflation: float = 1.0) -> FloatArray:
         """(n, n) covariance, per scale; infinite on the diagonal of what nothing determines.
 

@@ -17,7 +17,10 @@ from thsa_cosim.signals import FloatArray, Signals
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """A model identified on the fit recordings: its FMU, the fit, the held-out residuals (N,), and all its signals."""
+    """A model identified on the fit recordings: its FMU, the fit, the held-out residuals (N,), and all its signals.
+
+    ``apart`` (n,): how far the ends of several starts lie from the best one (`between_starts`).
+    """
 
     fmu: Path
     fit: Fit
@@ -26,6 +29,19 @@ class Identified:
     signals: dict[str, Signals | None]
     evaluations: int
     failures: dict[str, int]
+    apart: FloatArray
+
+
+def between_starts(best: Fit, ends: Sequence[tuple[FloatArray, float]]) -> FloatArray:
+    """(n,) how far ``ends`` (vector (n,), cost) lie from the best fit, each as likely as its cost makes it.
+
+    The root of the mean square over the best one and the ends; the costs count as what is left allows.
+    """
+    weights = np.array([np.exp(-0.5 * max(0.0, cost - best.cost) / best.inflation) for _, cost in ends])
+    squares = np.array([(vector - best.vector) ** 2 for vector, _ in ends]).reshape(
+        len(ends), best.vector.size
+    )
+    return np.asarray(np.sqrt(weights @ squares / (1.0 + weights.sum())))
 
 
 def identify_model(
@@ -45,17 +61,30 @@ def identify_model(
         bench = Bench(runner, own)
         found = bench.residuals(unknowns, np.array(starts), "fit")
         fits: list[Fit] = []
+        ends: list[tuple[FloatArray, float]] = []
         for residual, vector in zip(found, starts, strict=True):
             known = min((f.cost for f in fits), default=np.inf)
-            if residual is None or (fits and known <= cost_of(unknowns, vector, residual) + 1.0):
+            if residual is None:
+                continue
+            cost = cost_of(unknowns, vector, residual)
+            if fits and known <= cost + 1.0:
+                ends.append((vector, cost))
                 continue  # the fit so far is better than this start
             fit = refine(bench, unknowns, vector, residual=residual, iterations=12)
             fits += [] if fit is None else [fit]
         best = min(fits, key=lambda f: f.cost, default=None)
+        ends += [(f.vector, f.cost) for f in fits if f is not best]
         validate = None if best is None else bench.residuals(unknowns, best.vector[None, :], "validate")[0]
         if best is None or validate is None:
             reason = next(iter(bench.failures), "no run succeeded")
             raise StudyError(f"{fmu.name} cannot be identified: {reason}")
         return Identified(
-            fmu, best, validate, own, bench.signals(unknowns, best.vector), bench.evaluations, bench.failures
+            fmu,
+            best,
+            validate,
+            own,
+            bench.signals(unknowns, best.vector),
+            bench.evaluations,
+            bench.failures,
+            between_starts(best, ends),
         )

@@ -11,6 +11,7 @@ from thsa_cosim.diagnosis.results import (
     EmpiricalLaw,
     Errors,
     Evidence,
+    SeparatingExperiment,
     StructuredError,
     Value,
 )
@@ -85,15 +86,7 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
         "evidence": None if result.evidence is None else _evidence(result.evidence),
         "empirical": None if result.empirical is None else _law(result.empirical),
         "equivalence": [{"names": list(c.names), "angle_deg": c.angle_deg} for c in result.equivalence],
-        "experiment": None
-        if result.experiment is None
-        else {
-            "name": result.experiment.name,
-            "rivals": list(result.experiment.rivals),
-            "distance": result.experiment.distance,
-            "present": result.experiment.present,
-            "file": "experiment.csv",
-        },
+        "experiment": None if result.experiment is None else _experiment(result.experiment),
         "data": result.data.to_dict(),
         "trust": judge_ratios(_ratios(result.after if result.after["fit"] else result.before)).to_dict(),
         "notes": list(result.notes),
@@ -137,6 +130,25 @@ def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:
         files.append(again)
     write_json(folder / RESULT, content)
     return [*files, folder / RESULT, *write_pictures(folder)]
+
+
+def _experiment(best: SeparatingExperiment) -> dict[str, Any]:
+    """The next experiment: where its profile is, and what is expected of it."""
+    sharpened = best.sharpens
+    return {
+        "name": best.name,
+        "rivals": list(best.rivals),
+        "distance": best.distance,
+        "present": best.present,
+        "expected": best.expected,
+        "separates": best.separates,
+        "sharpens": None
+        if sharpened is None
+        else {"variable": sharpened.variable, "before": sharpened.before, "after": sharpened.after},
+        "seconds": float(best.inputs.time[-1] - best.inputs.time[0]),
+        "reached": {name: list(ends) for name, ends in best.reached.items()},
+        "file": "experiment.csv",
+    }
 
 
 def _law(law: EmpiricalLaw) -> dict[str, Any]:

@@ -151,11 +151,34 @@ def _alike(content: Content) -> list[str]:
 
 def _advice(content: Content) -> list[str]:
     """The experiment that would tell rivals apart, where there are any."""
-    best = content["experiment"]
     rivals = [name for e in content["effects"] for name in e["equivalent"]]
-    if best is None or not rivals:
-        return []
-    return [f"To distinguish {' from '.join(best['rivals'])}, run {best['name']} ({best['file']})."]
+    return next_experiment(content) if rivals and content["experiment"] is not None else []
+
+
+def next_experiment(content: Content) -> list[str]:
+    """What to record next, and what is expected of it; the sentence that says why not, where there is nothing."""
+    best = content["experiment"]
+    if best is None:
+        return [
+            "No next experiment: it needs an accepted effect, diagnose.command, and a profile within the limits."
+        ]
+    if best.get("sharpens"):
+        one = best["sharpens"]
+        return [
+            f"Next experiment: {best['name']} ({best['file']}). Expected: the standard error of {one['variable']} falls"
+            f" from {number(one['before'], 2)} to {number(one['after'], 2)}."
+        ]
+    names = " from ".join([best["rivals"][0], ", ".join(best["rivals"][1:])])
+    expected = best.get("expected", best["distance"])
+    if not best.get("separates", True):
+        return [
+            f"No profile within the limits is expected to distinguish {names} (best: {best['name']}, a gap of"
+            f" {number(expected**0.5, 2)} standard deviations). In these signals they may be one law."
+        ]
+    return [
+        f"To distinguish {names}, run {best['name']} ({best['file']}). Expected: a gap of {number(expected**0.5, 2)}"
+        " standard deviations once the rival is fitted to it. Then diagnose again with --with RECORDING."
+    ]
 
 
 def _undetermined(content: Content) -> list[str]:

@@ -301,6 +301,13 @@ def _experiment(content: Json | None) -> list[tuple[str, str]]:
     """What to record next, as a fact."""
     if not content:
         return []
+    if one := content.get("sharpens"):
+        falls = f"{one['variable']} from {number(one['before'], 2)} to {number(one['after'], 2)}"
+        text = f"Record {content['name']} ({content['file']}): the standard error of {falls}"
+        return [("next experiment", f"{text}, as far as the fitted model can tell.")]
+    if not content.get("separates", True):
+        text = f"No profile within the limits is expected to distinguish {listing(content['rivals'])}"
+        return [("next experiment", f"{text}: in these signals they may be one law.")]
     distance, present = content.get("distance"), content.get("present")
     file, rivals = content.get("file", "experiment.csv"), listing(content["rivals"])
     text = f"Record {content['name']} ({file}). It separates {rivals}"

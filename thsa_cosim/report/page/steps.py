@@ -71,8 +71,8 @@ def next_steps(study: Study) -> list[str]:
 def _after_diagnosis(result: Json) -> list[str]:
     steps = []
     word = result.get("verdict")
-    if result.get("experiment") and any(e.get("equivalent") for e in result.get("effects", [])):
-        best = result["experiment"]
+    best = result.get("experiment") or {}
+    if best.get("separates", bool(best)) and any(e.get("equivalent") for e in result.get("effects", [])):
         steps.append(
             f"Record {best['name']} ({best.get('file', 'experiment.csv')}): it separates the equivalent effects."
         )

@@ -1,4 +1,4 @@
-"""A burst of events that rounding noise makes ends again: the steps then grow to the length that the tolerance allows."""
+"""A burst of events that rounding noise makes ends: steps then grow to the length that the tolerance allows."""
 
 from pathlib import Path
 

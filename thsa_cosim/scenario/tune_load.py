@@ -34,12 +34,14 @@ from thsa_cosim.scenario.tune_schema import (
     METRICS,
     START_METRICS,
     ConditionTable,
+    LoopTable,
     RequirementTable,
     StartTable,
     TuneTable,
 )
 from thsa_cosim.scenario.tune_uncertainty import read_uncertainty
 from thsa_cosim.signals import FloatArray
+from thsa_cosim.system.description import SystemDescription
 from thsa_cosim.units import convert
 
 
@@ -79,8 +81,14 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
     profiles = _profiles(table, fmu, read_profiles(path, table, fmu))
     command = profiles[0].command if profiles else _command(table, fmu)
     axes = tuple(_axis(name, axis, fmu, f"conditions.{name}") for name, axis in table.conditions.items())
-    driven = {command.input, *(axis.name for axis in axes), *(table.profile.columns if table.profile else ())}
+    driven: set[str | None] = {
+        command.input,
+        *(axis.name for axis in axes),
+        *(table.profile.columns if table.profile else ()),
+    }
     axes += profile_axis(len(profiles))
+    if table.loop is not None and _interval(table.loop, fmu) is not None:
+        driven.add(table.loop.disturbance)  # it is 0 but for the margins
     for variable in fmu.inputs:
         if variable.is_float and variable.name not in driven and not variable.may_stay_open:
             raise ScenarioError(
@@ -298,7 +306,8 @@ def _loop(table: TuneTable, ends: float, fmu: FmuDescription, space: ParameterSp
     at = ends if table.loop.at is None else table.loop.at
     if at > ends:
         raise ScenarioError("loop.at lies after the end of the command; lower it.")
-    if not fmu.supports_model_exchange:
+    interval = _interval(table.loop, fmu)
+    if table.loop.disturbance is None and not fmu.supports_model_exchange:
         raise ScenarioError(
             f"[loop]: {fmu.path.name} has no Model Exchange, which linearising needs; export it with both or"
             f" remove the table."
@@ -312,7 +321,35 @@ def _loop(table: TuneTable, ends: float, fmu: FmuDescription, space: ParameterSp
     if table.loop.margins == "python-control" and importlib.util.find_spec("control") is None:
         raise MissingExtraError("loop.margins = 'python-control'", "control")
     variables = tuple(space[name].variable for name in names)
-    return LoopSpec.resolved(table.loop, at=at, gains=variables)
+    return LoopSpec.resolved(table.loop, at=at, gains=variables, interval=interval)
+
+
+def _interval(loop: LoopTable, fmu: FmuDescription) -> float | None:
+    """Interval of the disturbance that measures the margins; None where the FMU is linearised."""
+    if loop.disturbance is None:
+        if isinstance(fmu, SystemDescription):
+            raise ScenarioError(
+                "[loop]: a system that is coupled at run time is not linearised, its margins are measured: name a"
+                " 'disturbance' in the connection to the controller's measured input, and here with 'amplitude'."
+            )
+        return None
+    known = [v.name for v in fmu.inputs]
+    if loop.disturbance not in known:
+        raise ScenarioError(
+            f"loop.disturbance: {loop.disturbance!r} is no input; name it in the connection to {loop.signal!r}."
+            f"{did_you_mean(loop.disturbance, known)}"
+        )
+    if loop.amplitude is None:
+        raise ScenarioError(f"loop.amplitude is missing: the largest value that is added to {loop.signal!r}.")
+    steps = [
+        c.step
+        for c in (fmu.system.components if isinstance(fmu, SystemDescription) else ())
+        if c.execution == "sampled" and loop.signal.startswith(f"{c.name}.")
+    ]
+    interval = loop.interval or next(iter(steps), None)
+    if interval is None:
+        raise ScenarioError(f"loop.interval is missing: {loop.signal!r} is read by no sampled component.")
+    return interval
 
 
 def _start(table: TuneTable, fmu: FmuDescription) -> StartTable | None:

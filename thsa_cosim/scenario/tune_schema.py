@@ -253,10 +253,22 @@ class RequirementTable(Table):
 
 
 class LoopTable(Table):
-    """``[loop]``: where the loop is opened for its margins."""
+    """``[loop]``: where the loop is opened for its margins.
+
+    An FMU is linearised there. In a system that is coupled at run time, such as one with a sampled controller, the
+    margins are measured: a multisine is added to a connection (``disturbance``), in two further runs for each response.
+    """
 
     signal: Name
-    """The controller's output."""
+    """The controller's output; with ``disturbance`` the input that this is added to (the measured value)."""
+    disturbance: Name | None = None
+    """Input of the system that is added to ``signal`` (``disturbance`` of the connection)."""
+    amplitude: Positive | None = None
+    """Largest value of the disturbance, in the signal's unit: above its resolution, small enough to stay linear."""
+    period: Positive = 1.0
+    """s, of the disturbance: its inverse is the lowest frequency."""
+    interval: Positive | None = None
+    """s, between its values; left out: the sampling interval of the component that reads ``signal``."""
     at: NotNegative | None = None
     """s, at which state of the response; left out: at the end."""
     gains: list[Name] | None = Field(default=None, min_length=1)

@@ -10,15 +10,16 @@ import numpy as np
 
 from thsa_cosim.costs.response import RESPONSE_METRICS, response_metrics
 from thsa_cosim.fmu import FmuDescription, SimulationFailure
-from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.linear import open_loop, state_names
 from thsa_cosim.signals import FloatArray, Signals
-from thsa_cosim.tune.margins import Margins, margins
+from thsa_cosim.system import open_plant, unpack
+from thsa_cosim.system.frequency_response import loop_response
+from thsa_cosim.tune.margins import Margins, margins, margins_of
 from thsa_cosim.tune.start import start_terms
 
 if TYPE_CHECKING:  # workers import this module
     from thsa_cosim.scenario import TuneScenario
-    from thsa_cosim.scenario.tune_model import CommandSpec
+    from thsa_cosim.scenario.tune_model import CommandSpec, LoopSpec
     from thsa_cosim.scenario.tune_schema import StartTable
 
 
@@ -82,6 +83,49 @@ class LoopTask:
         return margins(loop, self.reader)
 
 
+@dataclass(frozen=True, eq=False)
+class MeasuredLoop:
+    """What measuring the margins of a running system needs; ``fixed`` and ``inputs`` as in the simulation."""
+
+    fmu: FmuDescription
+    fixed: Mapping[str, float]
+    inputs: Signals
+    tuned: tuple[str, ...]
+    target: str
+    disturbance: str
+    at: float
+    interval: float
+    amplitude: float
+    period: float
+    tolerance: float | None
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Variables that the simulation must record for it: tuned parameters."""
+        return self.tuned
+
+    def __call__(self, signals: Signals, command: FloatArray) -> Margins:
+        """Margins from ``at`` on; NaN where a run fails or the loop does not settle."""
+        values = {**self.fixed, **{name: float(signals[name][-1]) for name in self.tuned}}
+        try:
+            with open_plant(self.fmu, _unpacked(self.fmu)) as plant:
+                found = loop_response(
+                    plant,
+                    values,
+                    self.inputs,
+                    target=self.target,
+                    disturbance=self.disturbance,
+                    at=self.at,
+                    interval=self.interval,
+                    amplitude=self.amplitude,
+                    period=self.period,
+                    tolerance=self.tolerance,
+                )
+        except SimulationFailure:
+            return Margins(np.nan, np.nan, np.nan)
+        return margins_of(found.omega, found.response)
+
+
 _FOLDERS: dict[str, Path] = {}
 
 
@@ -112,7 +156,7 @@ class ResponseReducer:
     window: tuple[float, float]
     settling_band: float
     start: "StartTable | None"
-    loop: LoopTask | None
+    loop: LoopTask | MeasuredLoop | None
 
     @property
     def recorded(self) -> tuple[str, ...]:
@@ -168,18 +212,46 @@ def reducer(
         window=(metrics.window[0], metrics.window[1]),
         settling_band=metrics.settling_band,
         start=scenario.start,
-        loop=None
-        if loop is None
-        else LoopTask(
-            # A worker has a working directory of its own.
-            replace(scenario.fmu, path=scenario.fmu.path.resolve()),
+        loop=None if loop is None else _loop_task(scenario, loop, inputs, fixed, command.input, others),
+    )
+
+
+def _loop_task(
+    scenario: "TuneScenario",
+    loop: "LoopSpec",
+    inputs: Signals,
+    fixed: Mapping[str, float],
+    command: str,
+    others: list[str],
+) -> LoopTask | MeasuredLoop:
+    fmu = replace(
+        scenario.fmu, path=scenario.fmu.path.resolve()
+    )  # a worker has a working directory of its own
+    tuned = tuple(p.variable for p in scenario.parameters.parameters)
+    if loop.disturbance is not None:
+        assert loop.amplitude is not None
+        assert loop.interval is not None
+        return MeasuredLoop(
+            fmu,
             fixed,
-            {name: float(np.interp(loop.at, inputs.time, inputs[name])) for name in others},
-            command.input,
-            tuple(p.variable for p in scenario.parameters.parameters),
-            loop.gains,
+            inputs,
+            tuned,
             loop.signal,
+            loop.disturbance,
             loop.at,
-            loop.margins,
-        ),
+            loop.interval,
+            loop.amplitude,
+            loop.period,
+            scenario.simulation.tolerance,
+        )
+    return LoopTask(
+        fmu,
+        fixed,
+        {name: float(np.interp(loop.at, inputs.time, inputs[name])) for name in others},
+        command,
+        tuned,
+        loop.gains,
+        loop.signal,
+        loop.at,
+        loop.margins,
     )

@@ -154,6 +154,7 @@ def compensation(before: Any, after: Any) -> Figure:
         axis.plot(part.index, column(part, "w", "simulated"), color=EXTENDED, lw=1.0, label=label)
         axis.set(xlabel="time [s]", title=title)
     axes[0].set_ylabel("speed [rad/s]")
+    axes[0].set_ylim(top=15.0)
     axes[0].legend(frameon=False, fontsize=7, loc="upper right")
     figure.tight_layout()
     return figure

@@ -266,6 +266,23 @@ STRICT2 = """<?xml version="1.0" encoding="UTF-8"?>
 </fmiModelDescription>
 """
 
+HABITS2 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Habits" guid="{habits}" generationTool="a tool">
+ <CoSimulation modelIdentifier="habits2" {flags}/>
+ <DefaultExperiment startTime="0" stopTime="1" stepSize="0.01"/>
+ <ModelVariables>
+  <ScalarVariable name="y" valueReference="0" causality="output"><Real/></ScalarVariable>
+  <ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
+  <ScalarVariable name="tau" valueReference="2" causality="parameter" variability="fixed"><Real start="0.1"/>
+  </ScalarVariable>
+  <ScalarVariable name="gain" valueReference="3" causality="parameter" variability="fixed"><Real start="1"/>
+  </ScalarVariable>
+ </ModelVariables>
+ <ModelStructure><Outputs><Unknown index="1"/></Outputs><InitialUnknowns><Unknown index="1"/></InitialUnknowns>
+ </ModelStructure>
+</fmiModelDescription>
+"""
+
 
 def compiler() -> list[str] | None:
     """Return a C compiler's command, or None if there is none."""
@@ -373,3 +390,11 @@ def strict2() -> Path:
     """The lag of strict2.c, FMI 2.0 Co-Simulation: an FMU that refuses all that the standard does not allow."""
     resources = {"resources/factor.txt": b"1.5"}
     return write_fmu(_folder() / "strict2.fmu", STRICT2, library("strict2.c"), "strict2", resources)
+
+
+@cache
+def habits2(*defines: str, flags: str = 'canHandleVariableCommunicationStepSize="true"') -> Path:
+    """The lag of habits2.c, FMI 2.0 Co-Simulation, with the habits that ``defines`` name."""
+    name = "_".join(["habits2", *defines]).replace("=", "") + ("" if flags else "_plain")
+    xml = HABITS2.replace("{flags}", flags)
+    return write_fmu(_folder() / f"{name}.fmu", xml, library("habits2.c", *defines), "habits2")

@@ -116,6 +116,16 @@ def test_without_laps_nothing_is_said_of_them_and_without_recordings_nothing_at_
     assert force_balance(SPEC, [], []) is None
 
 
+def test_another_motion_has_no_laps_of_the_given_period() -> None:
+    wave = np.sin(2 * np.pi * TIME)
+    other = comparison("fit", wave)
+    for signals in (other.measured, other.simulated):
+        signals["q"][:] = 0.1 * np.sin(2 * np.pi * TIME / 1.3)
+    found = force_balance(SPEC, [other], [95.0])
+    assert found is not None
+    assert math.isnan(found.repeatability)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [

@@ -38,8 +38,13 @@ class Attempt:
     @property
     def is_final(self) -> bool:
         """Whether the outcome counts at once."""
-        inherited = self.outcome.status is Status.MEMORY and not self.was_first
-        return self.fault is None and not self.has_died and not inherited
+        return self.fault is None and not self.has_died and not self.is_inherited
+
+    @property
+    def is_inherited(self) -> bool:
+        """Whether an earlier run of its process may be to blame: memory is used up, or a second instance refused."""
+        refused = self.outcome.status is Status.LOAD_ERROR and "Instantiate" in self.outcome.reason
+        return (refused or self.outcome.status is Status.MEMORY) and not self.was_first
 
 
 class Batch:
@@ -50,6 +55,8 @@ class Batch:
         self.pending: deque[int] = deque()
         self.retries: deque[int] = deque()
         """Jobs for fresh workers, the first of each."""
+        self.refused: dict[int, str] = {}
+        """Jobs that got no instance in a process that had one before, and why."""
         self.index: dict[int, int] = {}
         """Serial of an order -> index of its job, for orders in the hands of workers."""
         self.left = len(jobs)
@@ -75,6 +82,8 @@ class Batch:
         if attempt.is_final:
             self.finish(index, attempt.outcome)
         elif first is None:
+            if attempt.outcome.status is Status.LOAD_ERROR and attempt.is_inherited:
+                self.refused[index] = attempt.outcome.reason
             self._first[index] = attempt
             self.retries.append(index)
         elif attempt.fault is not None:

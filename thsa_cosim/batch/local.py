@@ -27,6 +27,7 @@ _TICK_S = 0.05
 """How often deadlines, memory and floods are looked at."""
 _START_LIMIT_S = 180.0
 """A worker that is not ready by then is taken for dead (first start: machine code is compiled)."""
+_REFUSALS = 2  # instances that only a fresh process gave: the FMU gives one per process
 _FAILED_STARTS = 3
 _CLOSE_S = 2.0
 _AHEAD_S = 0.02
@@ -93,6 +94,10 @@ class LocalRunner(Closing):
         if workers < 1:
             raise ParameterError(f"workers is {workers}; it must be at least 1.")
         self.notes: Sequence[str] = ()
+        self.one_run_per_process = (
+            ""  # why each run has a process of its own: what the FMU says of a second instance
+        )
+        self._doubts_refusals, self._refusals = True, 0
         self._study = Study(experiments)
         self._wrapped = wrapper_names(experiments)
         self._count = workers
@@ -203,7 +208,7 @@ class LocalRunner(Closing):
 
     def _give(self, worker: WorkerProcess, count: int, batch: Batch) -> None:
         orders = []
-        for _ in range(count):
+        for _ in range(min(count, self._recycle_runs - worker.runs - len(worker.assigned))):
             index = batch.pending.popleft()
             job = batch.jobs[index]
             serial = next(self._serials)
@@ -268,12 +273,21 @@ class LocalRunner(Closing):
             worker.console_head = ""
         trouble = None if outcome.ok else self._study.trouble()
         fault = fault_of(outcome, trouble)
-        attempt = Attempt(outcome, fault, was_first=worker.runs == 1)
+        if (index := batch.index.pop(done.serial)) in batch.refused:
+            self._judge_refusal(outcome.ok, batch.refused[index])
+        sure = outcome.status is Status.LOAD_ERROR and not self._doubts_refusals
+        attempt = Attempt(outcome, fault, was_first=worker.runs == 1 or sure)
         tired = worker.runs >= self._recycle_runs or done.rss - worker.idle_rss >= self._recycle_growth
         if tired and not worker.is_leaving:
             worker.is_leaving = True
             worker.ask_to_stop()  # comes after the orders that it still has
-        batch.ended(batch.index.pop(done.serial), attempt)
+        batch.ended(index, attempt)
+
+    def _judge_refusal(self, helped: bool, reason: str) -> None:
+        """An FMU that refused an instance and gives one to a fresh process: every run gets one."""
+        self._doubts_refusals, self._refusals = helped, self._refusals + helped
+        if self._refusals >= _REFUSALS:
+            self.one_run_per_process, self._recycle_runs = reason, 1
 
     @staticmethod
     def _returned(worker: WorkerProcess, serials: tuple[int, ...], batch: Batch) -> None:

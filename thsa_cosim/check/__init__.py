@@ -1,6 +1,7 @@
 """What an FMU can be trusted with: read its description, then try it in worker processes.
 
 ``finding``   the lines of the report
+``excitation`` what the FMU is given
 ``trials``    how each line comes about
 ``numerics``  what the numbers of a trial mean
 """
@@ -8,8 +9,9 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from thsa_cosim.check.excitation import Excitation
 from thsa_cosim.check.finding import CheckReport, Finding, Verdict
-from thsa_cosim.check.trials import Excitation, Trials
+from thsa_cosim.check.trials import Trials
 from thsa_cosim.errors import ParameterError
 from thsa_cosim.fmu import FmuDescription, probe
 from thsa_cosim.signals import FloatArray, Signals

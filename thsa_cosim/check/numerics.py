@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from thsa_cosim.batch import Outcome
+from thsa_cosim.batch import Outcome, Status
 from thsa_cosim.batch.handling import HandlingTrial, largest_change
 from thsa_cosim.check.finding import Verdict
 from thsa_cosim.fmu.plant import Kind
@@ -14,6 +14,8 @@ STEP_OK, STEP_WARNING = 1e-4, 1e-2
 """Change of an output, relative to its range, when the communication step is halved."""
 AGREE = 1e-3
 """Deviation between ways of simulating the same that still counts as agreement."""
+_FAR = 20.0
+"""Ranges of an output over the rest of a run, by which its first value is no value."""
 Judged = tuple[Verdict, str, dict[str, float]]
 
 
@@ -31,9 +33,16 @@ def judge_handling(trial: HandlingTrial, kind: Kind) -> Judged:
     return Verdict.WARNING, f"{trial.sentence()}; {remedy}", errors
 
 
-def judge_step(first: Signals, outcome: Outcome, step: float) -> Judged:
-    """What half the communication step changes."""
+def judge_step(first: Signals, outcome: Outcome, step: float, fixed: bool = False) -> Judged:
+    """What half the communication step changes; ``fixed``: the FMU declares that it takes steps of one size."""
     if not outcome.ok or outcome.signals is None:
+        if fixed:
+            text = f"it takes steps of {step:g} s only, as it declares: what they cost in accuracy cannot be tried"
+            return Verdict.NOT_TRIED, text, {}
+        refused = outcome.status in (Status.FMI_ERROR, Status.FMI_DISCARD)
+        if refused and "t = 0 s" in outcome.reason:
+            text = f"it declares steps of any size, and refuses half of {step:g} s: {outcome.reason}"
+            return Verdict.WARNING, text, {}
         return Verdict.WARNING, f"halved, it fails: {outcome.status}: {outcome.reason}", {}
     change, worst = largest_change(first.values, {n: outcome.signals[n][::2] for n in first.names})
     verdict = Verdict.FAILED
@@ -112,6 +121,34 @@ def judge_changes(first: Signals, outcomes: Mapping[str, Outcome], what: str) ->
     if n and quiet == n:
         return Verdict.WARNING, f"no output changes with any of {n} {what}: they are ignored", values
     return Verdict.OK, text, values
+
+
+def judge_first_values(signals: Signals) -> Judged | None:
+    """An output whose first value has nothing to do with what follows: it is valid after the first step only."""
+    for name, values in signals.values.items():
+        span = float(np.ptp(values[1:])) if values.size > 10 else 0.0
+        if span > 0.0 and abs(float(values[1] - values[0])) > _FAR * span:
+            ends = f"{values[0]:.4g} at the start and {values[1]:.4g} after a step"
+            return Verdict.WARNING, f"{name} is {ends}: it is not set before the first step", {}
+    return None
+
+
+def judge_declared(first: Signals, outcome: Outcome) -> Judged | None:
+    """Whether parameters that are set to the values that they declare change anything."""
+    if not outcome.ok or outcome.signals is None:
+        return None
+    change, worst = largest_change(first.values, outcome.signals.values)
+    if change <= AGREE:
+        return None
+    text = f"set to the values that it declares, its parameters change {worst} by {change:.1e} of its range"
+    return Verdict.WARNING, f"{text}: it starts with others", {"change": change}
+
+
+def judge_memory(growth: float, limit: float, runs: int) -> Judged:
+    """Whether memory grows by ``growth`` bytes per run."""
+    leaks = growth > limit
+    text = f"grows by {growth / 1024:.1f} KiB per run" if leaks else f"steady over {runs} runs"
+    return Verdict.WARNING if leaks else Verdict.OK, text, {"growth_bytes_per_run": growth}
 
 
 def same(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> bool:

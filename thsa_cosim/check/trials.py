@@ -1,7 +1,7 @@
 """The trials of a check. Every one runs through ``batch``: an FMU that crashes, hangs or floods costs lines only."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome
 from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined, try_input_handling
 from thsa_cosim.check import coupling, numerics
+from thsa_cosim.check.excitation import Excitation
 from thsa_cosim.check.finding import Finding, Verdict
 from thsa_cosim.fmu import FmuDescription, probe
 from thsa_cosim.fmu.inputs import input_modes, is_ours
@@ -27,32 +28,6 @@ _ONE_BY_ONE = 60
 _MANY_STEPS = 20_000
 _LONG = 3000
 _LARGER = (10.0, 100.0)
-
-
-@dataclass(frozen=True)
-class Excitation:
-    """What the user says about how the FMU is to be tried; what is left out comes from its description."""
-
-    values: Mapping[str, float] = field(default_factory=dict)
-    """Start values, in the FMU's units."""
-    inputs: Signals | None = None
-    time: FloatArray | None = None
-    """(n,) s, communication points."""
-    ends: Mapping[str, float] = field(default_factory=dict)
-    """Value that an input runs to, by name, where ``inputs`` does not say it."""
-    duration: float | None = None
-    step: float | None = None
-    parameters: tuple[str, ...] = ()
-    """Parameters that have to change something; default: all that can."""
-    tolerance: float | None = None
-    kind: Kind | None = None
-    input_mode: str | None = None
-
-    def communication_points(self, description: FmuDescription, *, cut: bool = False) -> FloatArray:
-        """Return the communication points, (n,) s."""
-        if self.time is not None:
-            return self.time
-        return probe.trial_time(description, duration=self.duration, step=self.step, cut=cut)
 
 
 class Trials:
@@ -79,6 +54,7 @@ class Trials:
         self._mode = excitation.input_mode
         self._handling: HandlingTrial | None = None
         self._first = Signals(self._time, {})
+        self._halves = True
         self._changed = {
             name: value
             for name, value in probe.changed_parameters(description).items()
@@ -193,6 +169,8 @@ class Trials:
                 self._note(name, Verdict.NOT_TRIED, "the first run failed")
             return False
         self._first = outcome.signals
+        if (judged := numerics.judge_first_values(self._first)) is not None:
+            self._take("first values", judged)
         does = numerics.moves(outcome.signals)
         steps = len(self._time) - 1
         self._note(
@@ -285,8 +263,17 @@ class Trials:
             return
         # Machine code takes a second to load, and pays where there are many steps.
         many = len(tried) * len(self._time) > _MANY_STEPS
+        declared = {
+            v.name: v.start for v in self._description.parameters if v.name in tried and v.start is not None
+        }
         with self._runner(backend=None if many else "python") as runner:
-            outcomes = runner.run([Job("trial", {n: v}) for n, v in tried.items()])
+            jobs = [Job("trial", declared), *(Job("trial", {n: v}) for n, v in tried.items())]
+            as_declared, *outcomes = runner.run(
+                jobs
+            )  # the first in its process, as the one it is compared with
+        repeats = any(f.name == "new process" and f.verdict is Verdict.OK for f in self.findings)
+        if repeats and (judged := numerics.judge_declared(self._first, as_declared)) is not None:
+            self._take("declared values", judged)
         found = dict(zip(tried, outcomes, strict=True))
         self._take(name, numerics.judge_changes(self._first, found, "start values"))
 
@@ -297,9 +284,18 @@ class Trials:
                 [Job("trial"), Job("trial"), Job("halved"), Job("doubled")]
             )
             self._compare("new process", first, "the first run in another process")
-            self._compare("fresh instance", second, "a second instance in one process")
+            refused = runner.one_run_per_process
+            if refused:
+                text = f"a second one in a process is refused ({refused}): each run gets a separate process, or a reset"
+                self._note("fresh instance", Verdict.WARNING, text)
+            else:
+                self._compare("fresh instance", second, "a second instance in one process")
             self._step_lines(halved, doubled)
-            self._leak_lines("instances", runner.run([Job("short")] * (_WARM_UP + cycles)))
+            if refused:
+                for name in ("memory over instances", "file handles over instances"):
+                    self._note(name, Verdict.NOT_TRIED, "there is one instance per process")
+            else:
+                self._leak_lines("instances", runner.run([Job("short")] * (_WARM_UP + cycles)))
             return runner.run([Job("trial", self._changed)])[0].ok
 
     def reset_lines(self, cycles: int, runs_changed: bool) -> None:
@@ -329,7 +325,9 @@ class Trials:
             self._note(name, Verdict.NOT_TRIED, "Model Exchange: the importer's solver steps")
             return
         step = float(self._time[1] - self._time[0])
-        judged = numerics.judge_step(self._first, halved, step)
+        fixed = not self._description.capabilities.get("canHandleVariableCommunicationStepSize")
+        judged = numerics.judge_step(self._first, halved, step, fixed)
+        self._halves = halved.ok
         self._take(name, judged)
         if len(self._time) > 2 and self._given.inputs is None:  # else the step is the user's
             change = judged[2].get("change", 0.0)
@@ -339,7 +337,7 @@ class Trials:
         """Inputs of which nobody says how large they are: try larger ones, too."""
         unknown = [v for v in probe.excitable(self._description) if probe.is_undeclared(v)]
         unknown = [v for v in unknown if v.name not in self._given.ends]
-        if self._given.inputs is not None or not unknown or self._kind != "co-simulation":
+        if self._given.inputs is not None or not unknown or self._kind != "co-simulation" or not self._halves:
             return
         if is_ours(self._description):  # it controls its own step
             return
@@ -385,10 +383,7 @@ class Trials:
         # Medians of both halves: a single step of the allocator is no leak.
         half = len(prints) // 2
         growth = float(np.median(prints[-half:, 1]) - np.median(prints[:half, 1])) / (len(prints) - half)
-        leaks = growth > _LEAK_BYTES
-        text = f"grows by {growth / 1024:.1f} KiB per run" if leaks else f"steady over {len(prints)} runs"
-        verdict = Verdict.WARNING if leaks else Verdict.OK
-        self._note(memory, verdict, text, growth_bytes_per_run=growth)
+        self._take(memory, numerics.judge_memory(growth, _LEAK_BYTES, len(prints)))
         left = float(prints[-1, 2] - prints[0, 2])
         text = f"{left:g} left open after {len(prints)} runs" if left > 0 else "none left open"
         self._note(files, Verdict.WARNING if left > 0 else Verdict.OK, text, left_open=left)

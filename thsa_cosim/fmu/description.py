@@ -162,7 +162,9 @@ def read_description(path: Path | str) -> FmuDescription:
         try:
             xml = read_text(path, archive, "modelDescription.xml")
         except KeyError:
-            raise FmuError(f"{path} is a zip archive without modelDescription.xml and so no FMU.") from None
+            raise FmuError(
+                f"{path} is a zip archive without modelDescription.xml{_deeper(archive)} and so no FMU."
+            ) from None
         except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, zlib.error) as error:
             raise FmuError(f"{path}: modelDescription.xml cannot be unpacked ({error}).") from None
     try:
@@ -173,6 +175,8 @@ def read_description(path: Path | str) -> FmuDescription:
             platforms = tuple(sorted({*fmpy.supported_platforms(file), *_windows_paths(file)}))
     except Exception as error:
         message = " ".join(str(error).split()) or type(error).__name__
+        if isinstance(error, IndexError):
+            message = "its ModelStructure names a variable that is not there"
         raise FmuError(f"{path}: modelDescription.xml cannot be read ({message.rstrip('.')}).") from None
     if raw.coSimulation is None and raw.modelExchange is None:
         also = " but Scheduled Execution" if getattr(raw, "scheduledExecution", None) is not None else ""
@@ -214,6 +218,12 @@ def read_description(path: Path | str) -> FmuDescription:
             for unknown in raw.outputs
         },
     )
+
+
+def _deeper(archive: zipfile.ZipFile) -> str:
+    """Where a description lies that is not at the top."""
+    inside = [name for name in archive.namelist() if name.endswith("/modelDescription.xml")]
+    return f" at its top (it has {inside[0]}; zip what is in that folder)" if inside else ""
 
 
 def _windows_paths(file: IO[bytes]) -> set[str]:

@@ -97,7 +97,7 @@ def missing_binary(description: FmuDescription) -> str:
     wanted = platform_folders(description.fmi_version)
     identifiers = {description.co_simulation_identifier, description.model_exchange_identifier} - {None}
     with open_archive(description.path) as archive:
-        names = [name for name in archive.namelist() if not name.endswith("/")]
+        names = [name.replace("\\", "/") for name in archive.namelist() if not name.endswith("/")]
     files = [name.split("/") for name in names if name.startswith("binaries/") and name.count("/") >= 2]
     folders = sorted({parts[1] for parts in files})
     here = [f"{identifier}{LIBRARY_SUFFIX}" for identifier in sorted(identifiers, key=str)]

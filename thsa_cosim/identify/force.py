@@ -11,6 +11,9 @@ from thsa_cosim.scenario import ForceSpec
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.study import Comparison
 
+#: Laps are of one motion if their positions differ by less than this share of the stroke (rms).
+SAME_MOTION = 0.01
+
 
 def force_balance(
     spec: ForceSpec, comparisons: Sequence[Comparison], masses: Sequence[float]
@@ -37,7 +40,7 @@ def force_balance(
         )
         residual = found[spec.force]
         residuals.setdefault(comparison.role, []).append(residual)
-        if spec.period is not None:
+        if spec.period is not None and _repeats(comparison, spec.position, spec.period):
             samples_per_lap = round(spec.period * (residual.size - 1) / (found.time[-1] - found.time[0]))
             between_laps.append((repeatability(residual, samples_per_lap), residual.size))
     known = [(value, weight) for value, weight in between_laps if not math.isnan(value)]
@@ -49,3 +52,13 @@ def force_balance(
         if known
         else math.nan,
     )
+
+
+def _repeats(comparison: Comparison, position: str, period: float) -> bool:
+    """Whether the measured position after a ``period`` is what it was: a record of another motion has other laps."""
+    time, q = comparison.measured.time, comparison.measured[position]
+    before = time[time + period <= time[-1]]
+    if before.size < 2:
+        return False
+    apart = np.interp(before + period, time, q) - q[: before.size]
+    return float(np.sqrt(np.mean(apart**2))) < SAME_MOTION * float(np.ptp(q))

@@ -16,6 +16,8 @@ _FEW, _TOO_FEW = 200, 40
 _CATCH_UP = 0.5
 """s after a gap in which the model may still be elsewhere: its inputs are not known within."""
 _MOST_SPANS = 40
+_ABSURD = 1e15
+"""Steps between two stamps; more cannot be counted."""
 
 Found = Callable[..., Finding]
 
@@ -55,7 +57,8 @@ def time_findings(recording: str, time: FloatArray) -> Iterator[Finding]:
         text = f"the sampling step changes between {several[0]:.4g} s and {several[1]:.4g} s"
         yield found("several-rates", "warning", text)
     step = local_step(np.diff(time)) if several is not None else base_step(distances)
-    steps = np.diff(time) / step
+    with np.errstate(over="ignore"):  # a stamp of a damaged file may be any number
+        steps = np.minimum(np.diff(time) / step, _ABSURD)
     missing = np.where(steps > 1.5, np.round(steps) - 1.0, 0.0)
     regular = steps[(steps > 0.0) & (missing < _GAP)]
     scatter = float(np.sqrt(np.mean((regular - np.maximum(np.round(regular), 1.0)) ** 2)))

@@ -18,13 +18,13 @@ model BrushlessMotor "Brushless motor on a held voltage or under a speed loop, b
     "Friction";
   replaceable THSA.Effects.IdealInverter inverterEffect constrainedby THSA.Interfaces.VoltageEffect
     "Slot: voltage of the inverter";
-  replaceable THSA.Effects.IdealPhases phaseEffect constrainedby THSA.Interfaces.PhaseEffect
-    "Slot: sensors of the phase currents, legs of the inverter";
   replaceable THSA.Effects.ConstantTorqueConstant torqueEffect constrainedby THSA.Interfaces.TorqueConstantEffect
     "Slot: torque constant";
   replaceable THSA.Effects.NoFriction motorEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
     constrainedby THSA.Interfaces.FrictionEffect
     "Slot: friction and torques at the motor";
+  Real d_i(unit="A") = 0 "Error of the current's reading";
+  Real d_u(unit="V") = 0 "Error of the inverter's voltage";
   THSA.Units.AngularVelocity omega(nominal=10) "Speed";
   THSA.Units.Current i_m(nominal=0.1) "Current of the winding on a held voltage";
   THSA.Units.Current i_t(nominal=0.1) "Current that makes the torque";
@@ -34,17 +34,15 @@ initial equation
   i_m = if K_s > 0 then 0 else (u_q - K_t*w_start)/R;
 equation
   w = omega;
-  i_q = if K_s > 0 then K_s*(w_ref - omega) else i_m + phaseEffect.d;
-  i_t = if K_s > 0 then i_q - phaseEffect.d else i_m;
-  L*der(i_m) = (if K_s > 0 then 0 else u_q + inverterEffect.du + phaseEffect.du - K_t*(1 + torqueEffect.g_e)*omega) - R*i_m;
+  i_q = if K_s > 0 then K_s*(w_ref - omega) else i_m + d_i;
+  i_t = if K_s > 0 then i_q - d_i else i_m;
+  L*der(i_m) = (if K_s > 0 then 0 else u_q + inverterEffect.du + d_u - K_t*(1 + torqueEffect.g_e)*omega) - R*i_m;
   tau_e = K_t*(1 + torqueEffect.g_t)*i_t;
   friction.v = omega;
   friction.F_C = T_c;
   friction.b_v = b;
   J*der(omega) = tau_e - friction.F_f - motorEffect.F;
   inverterEffect.i_q = i_t;
-  phaseEffect.i_q = i_t;
-  phaseEffect.phi = phi;
   torqueEffect.i_q = i_t;
   motorEffect.v = omega;
   motorEffect.s = friction.s;

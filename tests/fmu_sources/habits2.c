@@ -1,0 +1,101 @@
+/* FMI 2.0 test FMU, Co-Simulation: a first-order lag with habits of tools, chosen by -D.
+ *
+ *     tau dy/dt = gain u - y
+ *
+ * ONCE: one instance per process, and never another. FIXED_STEP: steps of 0.01 s only. FIRST_VALUE=x: the output is
+ * x before the first step. OTHER_START: the parameters start elsewhere than the model description says.
+ */
+#include <math.h>
+#include <string.h>
+#include "fmi2Functions.h"
+
+typedef struct {
+    double y, u, tau, gain;
+    int steps;
+    const fmi2CallbackFunctions* callbacks;
+} Model;
+
+static void start(Model* m) {
+    m->y = m->u = 0.0;
+    m->tau = 0.1;
+    m->gain = 1.0;
+    m->steps = 0;
+#ifdef OTHER_START
+    m->gain = 7.0;
+#endif
+}
+
+const char* fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
+const char* fmi2GetVersion(void) { return fmi2Version; }
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[]) {
+    (void)c, (void)on, (void)n, (void)names;
+    return fmi2OK;
+}
+
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions* callbacks, fmi2Boolean visible, fmi2Boolean logging) {
+    (void)name, (void)type, (void)guid, (void)resources, (void)visible, (void)logging;
+#ifdef ONCE
+    static int count;
+    if (count++) {
+        callbacks->logger(NULL, "habits", fmi2Error, "logStatusError", "only one instance per process");
+        return NULL;
+    }
+#endif
+    Model* m = callbacks->allocateMemory(1, sizeof(Model));
+    m->callbacks = callbacks;
+    start(m);
+    return m;
+}
+void fmi2FreeInstance(fmi2Component c) { ((Model*)c)->callbacks->freeMemory(c); }
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerant, fmi2Real tolerance, fmi2Real t0,
+                               fmi2Boolean stops, fmi2Real stop) {
+    (void)c, (void)tolerant, (void)tolerance, (void)t0, (void)stops, (void)stop;
+    return fmi2OK;
+}
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) { (void)c; return fmi2OK; }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) { (void)c; return fmi2OK; }
+fmi2Status fmi2Terminate(fmi2Component c) { (void)c; return fmi2OK; }
+fmi2Status fmi2Reset(fmi2Component c) { start(c); return fmi2OK; }
+
+static double* real(Model* m, fmi2ValueReference vr) {
+    double* all[] = {&m->y, &m->u, &m->tau, &m->gain};
+    return vr < 4 ? all[vr] : NULL;
+}
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
+    for (size_t i = 0; i < n; i++) {
+        if (!real(c, vr[i])) return fmi2Error;
+        value[i] = *real(c, vr[i]);
+#ifdef FIRST_VALUE
+        if (vr[i] == 0 && !((Model*)c)->steps) value[i] = FIRST_VALUE;
+#endif
+    }
+    return fmi2OK;
+}
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
+    for (size_t i = 0; i < n; i++) {
+        if (!real(c, vr[i])) return fmi2Error;
+        *real(c, vr[i]) = value[i];
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_set_state) {
+    Model* m = c;
+    (void)t, (void)no_set_state;
+#ifdef FIXED_STEP
+    if (fabs(h - 0.01) > 1e-9) return fmi2Error;
+#endif
+    m->y += (m->gain * m->u - m->y) * (1.0 - exp(-h / m->tau));
+    m->steps++;
+    return fmi2OK;
+}
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real* value) {
+    (void)c, (void)kind, (void)value;
+    return fmi2Discard;
+}
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean* value) {
+    (void)c, (void)kind, (void)value;
+    return fmi2Discard;
+}

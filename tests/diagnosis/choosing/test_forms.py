@@ -94,6 +94,17 @@ def test_a_fraction_of_the_speed_is_known_from_an_exponential():
     assert found.final.at(["c"])[0] == pytest.approx(DECLARED["c"], rel=0.03)
 
 
+def test_a_rival_in_another_place_bends_nothing_behind_a_rigid_gear():
+    """Its errors are compared as well: what is kept of it has to do for that."""
+    own, found = diagnosed(HESS_SOOM, "stribeck", 1)
+    (one,) = found.rounds
+    assert [r.candidate.effect.name for r in one.rivals] == ["stribeck"]
+    trials, fit = own.of("fit"), found.accepted[0].fit
+    added = between_models(found, fit, trials)
+    assert np.isfinite(added).all()
+    assert one.rivals[0].fit.jacobian.shape == (fit.residual.size, len(one.rivals[0].fit.vector))
+
+
 def test_a_form_that_fits_worse_counts_by_its_likelihood():
     def fitted(cost: float, inflation: float = 1.0) -> Any:
         return SimpleNamespace(fit=SimpleNamespace(cost=cost, inflation=inflation))

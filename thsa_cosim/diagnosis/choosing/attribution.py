@@ -50,10 +50,9 @@ class Round:
 
     @property
     def folded(self) -> "Round":
-        """The same without the Jacobians of what was not accepted."""
-        kept = {id(s): s if s is self.accepted else s.folded for s in (*self.scored, *self.rivals)}
-        scored, rivals = (tuple(kept[id(s)] for s in listed) for listed in (self.scored, self.rivals))
-        return replace(self, scored=scored, rivals=rivals)
+        """The same without the Jacobians of what was only weighed; errors are compared with those of the rivals."""
+        whole = {id(s) for s in (self.accepted, *self.rivals, *self.forms)}
+        return replace(self, scored=tuple(s if id(s) in whole else s.folded for s in self.scored))
 
     def probability(self, gain: float) -> float:
         """Probability that chance makes at least ``gain``."""

@@ -7,6 +7,7 @@ import pytest
 
 from thsa_cosim import cli
 from thsa_cosim.cli import demo as demo_module
+from thsa_cosim.fmu import sources
 from thsa_cosim.report.page.index import Entry, write_index
 
 ROOT = Path(__file__).parents[2]
@@ -67,7 +68,7 @@ def test_without_the_exporter_its_steps_are_left_out(
 ) -> None:
     ran: list[tuple[str, ...]] = []
     monkeypatch.chdir(short_checkout)
-    monkeypatch.setattr(demo_module, "_EXPORTER", ("no_such_package",))
+    monkeypatch.setattr(sources, "has_compiler", lambda: False)
     monkeypatch.setattr(demo_module, "_run", lambda step: ran.append(step.words))
     for name in ("_checked", "_identified", "_tuned"):
         monkeypatch.setattr(demo_module, name, lambda _: ["<done>"])
@@ -82,7 +83,7 @@ def test_a_step_that_fails_ends_the_demo_with_its_name(
     short_checkout: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(short_checkout)
-    monkeypatch.setattr(demo_module, "_EXPORTER", ("no_such_package",))
+    monkeypatch.setattr(sources, "has_compiler", lambda: False)
     (short_checkout / "fmus").unlink()
     assert cli.run_command(["demo", "-o", "out"]) == 3
     err = capsys.readouterr().err
@@ -96,7 +97,7 @@ def test_in_an_empty_folder_the_demo_brings_its_data(tmp_path: Path, monkeypatch
     monkeypatch.setattr(demo_module, "_run", lambda step: ran.append(step.words))
     for name in ("_checked", "_identified", "_tuned", "_diagnosed"):
         monkeypatch.setattr(demo_module, name, lambda _: ["<done>"])
-    monkeypatch.setattr(demo_module, "_EXPORTER", ("no_such_package",))
+    monkeypatch.setattr(sources, "has_compiler", lambda: False)
     assert cli.run_command(["demo", "-o", "out"]) == 0
     paths = [Path(word) for words in ran for word in words if "scenarios" in word or "fmus" in word]
     assert len(paths) >= 7

@@ -81,3 +81,17 @@ def test_events_between_the_rows_of_a_model_without_states(tmp_path):
             run = plant.run({}, None, ("y", "m"), np.array([0.0, 0.25, 0.5, 0.75, 1.0]))
         assert run["y"] == pytest.approx([0.0, 2.0, 15.0, 17.0, 20.0])
         assert run["m"] == pytest.approx([1.0, 3.0, 6.0, 8.0, 11.0])
+
+
+@pytest.mark.parametrize("kind", ["co-simulation", "model-exchange"])
+def test_a_timer_that_an_event_within_a_step_starts_ends_at_its_instant(tmp_path, kind):
+    """Its relation was 1e9 s from its change at first: a dead band in proportion to that would be 0.1 ms."""
+    shutil.copy(MODELS / "Timer.mo", tmp_path)
+    here = [native_platform().fmi3]
+    fmu = export_fmu(str(tmp_path / "Timer.mo"), output=tmp_path / "Timer.fmu", platforms=here)
+    crossed = -np.log(0.75)
+    for time in (np.array([0.0, 1.0]), np.linspace(0.0, 1.0, 101)):
+        with Plant.open(fmu, kind=kind) as plant:
+            run = plant.run({}, None, ("x", "z", "w"), time, tolerance=1e-9)
+        assert run["z"] == pytest.approx(np.maximum(0.0, time - crossed - 0.1), abs=2e-8)
+        assert run["w"] == pytest.approx(np.maximum(0.0, time - crossed - 0.2), abs=2e-8)

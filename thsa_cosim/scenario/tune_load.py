@@ -139,7 +139,7 @@ def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription
         pareto=checked_pareto(table),
         line=checked_line(table, space),
         surface=checked_surface(table, space),
-        search=SearchTable(method="differential-evolution", **table.search.model_dump(), polish=False),
+        search=SearchTable(method="differential-evolution", **table.search.model_dump()),
         simulation=table.simulation,
         profiles=profiles,
     )

@@ -356,6 +356,14 @@ class ParetoTable(Table):
     """The other."""
 
 
+class TuneSearchTable(EvolutionTable):
+    """``[search]``: differential evolution, then a simplex from its best vector."""
+
+    polish: bool = True
+    """Nelder and Mead's simplex, which slides along the edges that requirements make. Without it the evolution runs
+    alone, as in the article."""
+
+
 class LineTable(Table):
     """``[line]``: the ratio of two parameters that the population draws towards."""
 
@@ -411,5 +419,5 @@ class TuneTable(ModelTable):
     pareto: ParetoTable | None = None
     line: LineTable | None = None
     surface: SurfaceTable | None = None
-    search: EvolutionTable = EvolutionTable()
+    search: TuneSearchTable = TuneSearchTable()
     simulation: SimulationTable = SimulationTable()

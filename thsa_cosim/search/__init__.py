@@ -10,6 +10,8 @@
     the minimum confirmed with central differences, and the Jacobian that uncertainty needs.
 ``profile``
     profile likelihood: intervals without the assumption of a parabola.
+``simplex``
+    the minimum of a cost with edges, from the end of a global search.
 ``uncertainty``
     standard errors under autocorrelated residuals, and which parameters the data determine.
 """
@@ -40,6 +42,7 @@ from thsa_cosim.search.local import (
 )
 from thsa_cosim.search.polish import PolishResult, PolishSettings, confirm, polish
 from thsa_cosim.search.profile import CHI2_95, Profile, profile
+from thsa_cosim.search.simplex import SimplexResult, SimplexSettings, descend
 from thsa_cosim.search.uncertainty import (
     Uncertainty,
     andrews_bandwidth,
@@ -67,11 +70,14 @@ __all__ = [
     "Prior",
     "Profile",
     "Residuals",
+    "SimplexResult",
+    "SimplexSettings",
     "Uncertainty",
     "agreement",
     "andrews_bandwidth",
     "answer",
     "confirm",
+    "descend",
     "difference_columns",
     "estimate_uncertainty",
     "evolve",

@@ -11,7 +11,14 @@ from thsa_cosim.batch import Journal
 from thsa_cosim.errors import StudyError
 from thsa_cosim.scenario import TuneScenario
 from thsa_cosim.scenario.tune_model import combinations
-from thsa_cosim.search import EvolutionResult, EvolutionSettings, Generation, evolve
+from thsa_cosim.search import (
+    EvolutionResult,
+    EvolutionSettings,
+    Generation,
+    SimplexSettings,
+    descend,
+    evolve,
+)
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.study import (
     Engine,
@@ -168,7 +175,22 @@ class _Tuning:
         def on_generation(generation: Generation) -> None:
             engine.note_generation(generation.index)
 
-        return evolve(costs, space.dimension, settings, start=start, on_generation=on_generation)
+        found = evolve(costs, space.dimension, settings, start=start, on_generation=on_generation)
+        if not self.scenario.search.polish or not np.isfinite(found.cost):
+            return found
+        lowest = descend(
+            lambda vectors: ask(Request(Want.TERMS, space.physical(vectors))).costs,
+            found.best,
+            found.cost,
+            SimplexSettings(),
+        )
+        return replace(
+            found,
+            best=lowest.best,
+            cost=lowest.cost,
+            evaluations=found.evaluations + lowest.evaluations,
+            reason=f"{found.reason}; a simplex from its best: cost {found.cost:.6g} to {lowest.cost:.6g}",
+        )
 
     def _gains(self, index: int) -> dict[str, float]:
         return self.scenario.parameters.decode(self.found[index].best)

@@ -282,6 +282,7 @@ Status solver_advance(Instance *c, double end) {
             if (++rapid == MOST_RAPID)
                 instance_log(c, WARNING, LOG_WARNING, "burst of events at time %.15g is crossed blindly", now->time);
         }
+        if (N_TIMED && restarted) end = fmin(end, c->due = discrete_next(c)); /* an event may set a timer */
         if (instance_indicators(c) != OK || judge(c, c->g, &start))
             return give_up(c, "event indicators cannot be computed");
     }

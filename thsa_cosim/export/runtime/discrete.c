@@ -230,10 +230,10 @@ double discrete_next(Instance *c) { return fmin(next_tick(c), next_relation(c));
 Status discrete_advance(Instance *c, double end) {
     State *s = &c->s;
     while (s->now.time < end && !c->return_early) {
-        const double next = discrete_next(c);
-        const Status status = solver_advance(c, next < end ? next : end);
+        c->due = discrete_next(c);
+        const Status status = solver_advance(c, fmin(c->due, end));
         if (status != OK) return status;
-        if (next > s->now.time + discrete_grain(s->now.time)) continue;
+        if (c->due > s->now.time + discrete_grain(s->now.time)) continue;
         s->now.bends = 1;
         if (instance_update_modes(c) != OK) return DISCARD;
     }

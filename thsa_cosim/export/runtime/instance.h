@@ -74,6 +74,7 @@ struct Instance {
     int dx_valid, y_valid, w_valid, g_valid;
     double dx[N_X + 1], w[N_W + 1], g[N_G + 1];
     double slope[N_G + 1];   /* dg/dt of time events, 0 of other relations; as of the last event */
+    double due;              /* the next time event, which an event within a step may move */
 
     /* solver workspace, nothing in it outlives a change of the point except through its validity flags */
     int jacobian_valid, factors_of; /* factors_of: index of the Jacobian that lu holds, -1 = none */

@@ -7,9 +7,9 @@ from thsa_cosim.signals import FloatArray
 
 
 def drag(p: Values, at: Connectors) -> FloatArray:
-    """b_q v^2 (|v|/v_r)^(n-2) sgn(v)."""
-    speed = np.abs(at["v"])
-    return np.asarray(p["b_q"] * speed ** p["n"] * p["v_r"] ** (2.0 - p["n"]) * at["s"])
+    """b_q v^2 (|v|/v_r)^(n-2) sgn(v); the square where no exponent is given."""
+    n, v_r = p.get("n", 2.0), p.get("v_r", 1.0)
+    return np.asarray(p["b_q"] * np.abs(at["v"]) ** n * v_r ** (2.0 - n) * at["s"])
 
 
 def _variant(*further: EffectParameter) -> Variant:

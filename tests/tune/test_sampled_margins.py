@@ -31,7 +31,9 @@ def scenario(folder: Path, loop: str = LOOP) -> Path:
     text = text.replace('to = "controller.w_m"\n', 'to = "controller.w_m"\ndisturbance = "w_disturbance"\n')
     text = text.replace("../fmus", str(ROOT / "fmus"))
     text = text.replace('[[requirements]]\nmetric = "overshoot"', loop, 1)
-    text = text.replace("population = 16\ngenerations = 10", "population = 5\ngenerations = 1\npolish = false")
+    text = text.replace(
+        "population = 16\ngenerations = 10", "population = 5\ngenerations = 1\npolish = false"
+    )
     text = text.replace(
         "lower = 0.03\nupper = 3.0", "lower = 0.62\nupper = 0.7"
     )  # near gains that hold every limit

@@ -51,6 +51,33 @@ def test_shipped_recordings_are_matched_as_their_scenarios_do(
 
 
 @needs_fmus
+def test_files_are_given_with_or_without_options(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    fmu, recording = str(ROOT / "fmus" / "Motor.fmu"), str(RECORDINGS / "motor_m30.parquet")
+    assert cli.run_command(["init", "--fmu", fmu, "--recording", recording, "-o", "a.toml"]) == 0
+    assert cli.run_command(["init", recording, fmu, "-o", "b.toml"]) == 0
+    assert cli.run_command(["init", fmu, "--recording", recording, "-o", "c.toml"]) == 0
+    texts = [Path(f"{n}.toml").read_text(encoding="utf-8").replace(f"{n}.toml", "S") for n in "abc"]
+    assert texts[0] == texts[1] == texts[2]
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ([], "init takes one FMU, and none was given"),
+        (["a.fmu", "b.fmu", "x.csv"], "2 were given (a.fmu, b.fmu)"),
+        (["a.fmu", "--fmu", "b.fmu", "x.csv"], "2 were given (a.fmu, b.fmu)"),
+        (["a.fmu"], "no recording was given: thsa-cosim init a.fmu RECORDING.csv"),
+    ],
+)
+def test_what_is_missing_is_one_sentence(
+    given: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.run_command(["init", *given]) == 2
+    assert sentence in capsys.readouterr().err
+
+
+@needs_fmus
 def test_three_commands_from_a_recording_to_parameters_with_uncertainty(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -26,7 +26,7 @@ FAILED = 3
 """Exit code of a check whose verdict is "failed"."""
 
 
-@click.command()
+@click.command(short_help="Say what an FMU, a recording or a scenario can be trusted with.")
 @click.argument("path", type=PATH)
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
 @click.option("-o", "--output", type=PATH, default=None, help="Also write the findings as JSON to this file.")

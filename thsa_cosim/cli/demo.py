@@ -36,7 +36,7 @@ class Step:
     """File name of the plot that shows what came out."""
 
 
-@click.command()
+@click.command(short_help="Run every main command on the shipped data.")
 @click.option(
     "-o",
     "--output",

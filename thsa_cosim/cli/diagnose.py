@@ -13,7 +13,7 @@ from thsa_cosim.cli.options import PATH, StudyOptions, console, study_options
 NOT_TESTED = 3
 
 
-@click.command()
+@click.command(short_help="Find the effect that the model lacks, add it, and judge it.")
 @study_options
 @click.option("--package", type=PATH, default=None, help="Folder of the model's Modelica package.")
 @click.option(

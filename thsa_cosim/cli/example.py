@@ -7,7 +7,7 @@ import click
 from thsa_cosim.cli.options import PATH, console
 
 
-@click.command()
+@click.command(short_help="Copy a shipped scenario with its data.")
 @click.argument("name", required=False)
 @click.option("-o", "--output", type=PATH, default=Path(), help="Folder to copy into; default: this one.")
 def example(name: str | None, output: Path) -> None:

@@ -10,7 +10,7 @@ from thsa_cosim.cli.options import PATH
 from thsa_cosim.shipped import modelica_package
 
 
-@click.command()
+@click.command(short_help="Export a Modelica class as an FMU.")
 @click.argument("model", required=False)
 @click.option(
     "--package",

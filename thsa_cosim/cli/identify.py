@@ -9,7 +9,7 @@ from thsa_cosim.cli.options import StudyOptions, study_options
 from thsa_cosim.errors import ThsaCosimError
 
 
-@click.command()
+@click.command(short_help="Identify parameters from recordings, at each temperature.")
 @study_options
 @click.option(
     "--export-fmu/--no-export-fmu",

@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     from thsa_cosim.draft import Draft
 
 
-@click.command()
-@click.option("--fmu", type=PATH, required=True, help="The FMU to simulate.")
+@click.command(short_help="Write a first scenario for an FMU and recordings.")
+@click.argument("files", metavar="[FMU] [RECORDING]...", type=PATH, nargs=-1)
+@click.option("--fmu", type=PATH, help="The FMU (or SSP archive) to simulate; or give it as an argument.")
 @click.option(
     "--recording",
     "recordings",
     type=PATH,
     multiple=True,
-    required=True,
-    help="A file of measured signals; may be repeated.",
+    help="A file of measured signals, or give it as an argument; may be repeated.",
 )
 @click.option(
     "-o",
@@ -37,7 +37,13 @@ if TYPE_CHECKING:
     help="A parameter of the FMU to identify, with its bounds in the FMU's unit (default: a fifth and five times its"
     " start value); may be repeated.",
 )
-def init(fmu: Path, recordings: tuple[Path, ...], output: Path, identify: tuple[str, ...]) -> None:
+def init(
+    files: tuple[Path, ...],
+    fmu: Path | None,
+    recordings: tuple[Path, ...],
+    output: Path,
+    identify: tuple[str, ...],
+) -> None:
     """Write a commented scenario that drives an FMU with a recording and compares, or identifies parameters.
 
     Columns are matched to the FMU's inputs and outputs by name, description and unit; columns without a
@@ -50,6 +56,7 @@ def init(fmu: Path, recordings: tuple[Path, ...], output: Path, identify: tuple[
     from thsa_cosim.scenario import load_scenario
     from thsa_cosim.system import read_description
 
+    fmu, recordings = _sorted(files, fmu, recordings)
     if output.exists():
         raise InputError(f"{output} exists already; choose another file with -o.")
     draft = draft_scenario(read_description(fmu), recordings, output, identify)
@@ -78,6 +85,21 @@ def init(fmu: Path, recordings: tuple[Path, ...], output: Path, identify: tuple[
         )
         return
     click.echo(f"{output} is ready: thsa-cosim simulate {output}")
+
+
+def _sorted(
+    files: tuple[Path, ...], fmu: Path | None, recordings: tuple[Path, ...]
+) -> tuple[Path, tuple[Path, ...]]:
+    """The FMU and the recordings, from arguments and options."""
+    models = [path for path in files if path.suffix.lower() in (".fmu", ".ssp")]
+    models += [fmu] if fmu is not None else []
+    recordings = (*recordings, *(path for path in files if path not in models))
+    if len(models) != 1:
+        given = f"{len(models)} were given ({', '.join(map(str, models))})" if models else "none was given"
+        raise InputError(f"init takes one FMU, and {given}: thsa-cosim init MODEL.fmu RECORDING.csv.")
+    if not recordings:
+        raise InputError(f"no recording was given: thsa-cosim init {models[0]} RECORDING.csv.")
+    return models[0], recordings
 
 
 def _print(draft: "Draft") -> None:

@@ -7,7 +7,7 @@ import click
 from thsa_cosim.cli.options import PATH
 
 
-@click.command()
+@click.command(short_help="Write the HTML page of a study, finished or running.")
 @click.argument("folder", metavar="DIR", type=PATH)
 @click.option("-o", "--output", type=PATH, default=None, help="The file to write; default DIR/report.html.")
 @click.option("--open", "show", is_flag=True, help="Show the page in the browser.")

@@ -9,7 +9,7 @@ import click
 from thsa_cosim.cli.options import PATH, console
 
 
-@click.command(name="list")
+@click.command(name="list", short_help="List the studies in a folder, the latest first.")
 @click.argument("folder", type=PATH, required=False)
 @click.option("--json", "as_json", is_flag=True, help="Print the studies as JSON.")
 def list_command(folder: Path | None, as_json: bool) -> None:
@@ -28,7 +28,7 @@ def list_command(folder: Path | None, as_json: bool) -> None:
         click.echo(f"no study in {place}")
 
 
-@click.command()
+@click.command(short_help="Compare studies: parameters, effects, errors.")
 @click.argument("folders", metavar="A B ...", type=PATH, nargs=-1, required=True)
 @click.option("-o", "--output", type=PATH, default=None, help="Also write the comparison as an HTML page.")
 @click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")

@@ -6,7 +6,7 @@ from thsa_cosim.cli.dry_run import dry_run_option, show_forecast
 from thsa_cosim.cli.options import StudyOptions, study_options
 
 
-@click.command()
+@click.command(short_help="Tune gains for a command and its conditions.")
 @study_options
 @dry_run_option
 def tune(options: StudyOptions, dry_run: bool) -> None:

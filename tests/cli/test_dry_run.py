@@ -90,7 +90,7 @@ def test_a_tuning_counts_conditions_and_the_map(tmp_path: Path, capsys: pytest.C
     )
     assert code == 0
     (part,) = json.loads(out)["parts"]
-    assert [s["vectors"] for s in part["searches"]] == [6 * 4 + 2]
+    assert [s["vectors"] for s in part["searches"]] == [6 * 4 + 180]  # and the simplex, as a rule
     assert part["also"] == 3 + 9  # before, after, the article's gains; the map of the cost
     assert not (tmp_path / "study").exists()
 

@@ -13,6 +13,7 @@ from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.scenario import AnyScenario, Executor, Scenario, SimulationTable, StagedScenario, TuneScenario
 from thsa_cosim.study import build_case
 from thsa_cosim.tune.problem import build_groups
+from thsa_cosim.tune.run import planned_sets
 
 SAMPLE = 12
 """Runs that are timed, besides one per worker to warm up."""
@@ -112,12 +113,11 @@ def _of_recordings(scenario: Scenario, executor: Executor) -> Forecast:
 
 def _of_tuning(scenario: TuneScenario, executor: Executor) -> Forecast:
     groups = build_groups(scenario)
-    spec, space = scenario.search, scenario.parameters
     searches = [
         Search(
             group.label,
             tuple(case.condition.label for case in group.cases),
-            planned_vectors(spec, len(space)),
+            planned_sets(scenario),
         )
         for group in groups
     ]
@@ -127,7 +127,7 @@ def _of_tuning(scenario: TuneScenario, executor: Executor) -> Forecast:
         also += scenario.surface.points**2 * len(groups[0].cases)
     if scenario.schedule is not None:
         also += (1 + sets) * int(np.prod([len(axis.values) for axis in scenario.schedule.check]))
-    asks = [(case.experiment, space, "") for case in groups[0].cases]
+    asks = [(case.experiment, scenario.parameters, "") for case in groups[0].cases]
     return _timed(scenario.title, searches, also, asks, scenario.simulation, scenario.seed, executor)
 
 

@@ -28,6 +28,10 @@ class SimplexSettings:
     starts: int = 4
     evaluations: int = 100
 
+    def usual(self, dimension: int) -> int:
+        """Evaluations that a descent in so many directions takes as a rule: two starts."""
+        return min(90 * dimension, 2 * self.evaluations)
+
 
 @dataclass(frozen=True)
 class SimplexResult:

@@ -92,6 +92,13 @@ def tune(scenario: TuneScenario, place: Place) -> TuneResult:
     return tuning.result()
 
 
+def planned_sets(scenario: TuneScenario) -> int:
+    """Sets of gains that the search of one group evaluates: at most, and as a rule for the simplex."""
+    spec = scenario.search
+    simplex = SimplexSettings().usual(len(scenario.parameters)) if spec.polish else 0
+    return spec.population * (spec.generations + 1) + simplex
+
+
 @dataclass(eq=False)
 class _Tuning:
     """What has been found so far."""
@@ -137,9 +144,8 @@ class _Tuning:
             seed=self.scenario.seed,
             tolerance=spec.tolerance,
         )
-        planned = settings.population * (settings.generations + 1)
         for group in self.groups:
-            engine.plan(group, planned)
+            engine.plan(group, planned_sets(self.scenario))
 
         def task(index: int) -> Callable[[Ask], EvolutionResult]:
             return lambda ask: self._evolve(index, settings, engine, ask)

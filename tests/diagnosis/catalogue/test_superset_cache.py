@@ -78,5 +78,5 @@ def test_an_edited_effect_acts_as_it_now_says(package: Path, tmp_path: Path) -> 
     assert np.array_equal(speed(), before)
     text = (package / WINDAGE).read_text(encoding="utf-8")
     (right,) = [line for line in text.splitlines() if line.strip().startswith("F =")]
-    edit(package / WINDAGE, right, right.replace("F =", "F = 2*"))
+    edit(package / WINDAGE, right, right.replace("then b_q", "then 2*b_q"))
     assert not np.allclose(speed(), before, rtol=1e-6, atol=0.0)

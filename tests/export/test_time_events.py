@@ -10,11 +10,11 @@ pytest.importorskip("casadi", reason="the export extra is not installed")
 pytest.importorskip("ziglang", reason="the export extra is not installed")
 
 import fmpy
+from courses import noted_courses
 
 from thsa_cosim.export import export_fmu
 from thsa_cosim.export.compile import native_platform
 from thsa_cosim.fmu import Plant
-from thsa_cosim.fmu.trajectory import Course
 
 MODELS = Path(__file__).parents[1] / "modelica"
 NAMES = ("x", "w", "from", "after", "scaled", "wave", "n")
@@ -48,14 +48,7 @@ def test_the_value_at_the_instant_is_the_one_after_the_event(built, stepping, gr
 
 
 def test_steps_end_at_time_events_without_a_search(built, monkeypatch):
-    runs = []
-    made = Course.__init__
-
-    def noted(self, *given):
-        made(self, *given)
-        runs.append(self.struct)
-
-    monkeypatch.setattr(Course, "__init__", noted)
+    runs = noted_courses(monkeypatch)
     with Plant.open(built, stepping="free") as plant:
         plant.run({"t0": 0.3}, None, ("x",), np.array([0.0, 1.0]))
     # 10 ticks, t0 from both sides, 0.1 after it, 0.5 and 1.0, four changes of sin; two steps to each at most

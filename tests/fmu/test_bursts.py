@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
+from courses import noted_courses
 
 from thsa_cosim.fmu import Plant
-from thsa_cosim.fmu.trajectory import Course
 from thsa_cosim.scenario import load_scenario
 from thsa_cosim.simulate import _cases
 
@@ -13,14 +13,7 @@ SCENARIO = Path(__file__).parents[2] / "scenarios" / "driven_check.toml"
 
 
 def test_grazing_events_of_the_driven_check_do_not_leave_blind_steps_behind(monkeypatch):
-    runs = []
-    made = Course.__init__
-
-    def noted(self, *given):
-        made(self, *given)
-        runs.append(self.struct)
-
-    monkeypatch.setattr(Course, "__init__", noted)
+    runs = noted_courses(monkeypatch)
     for recording, _, experiment in _cases(load_scenario(SCENARIO)):
         with Plant.open(experiment.fmu, stepping="free") as plant:
             plant.run(

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from courses import noted_courses
 
-from thsa_cosim.fmu import Plant, trajectory
+from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import Signals
 
 FMUS = Path(__file__).parents[2] / "fmus"
@@ -132,14 +133,7 @@ def test_a_path_that_breaks_without_load_shows_once_it_is_loaded() -> None:
 @pytest.mark.parametrize("name", [None, *FAILURES])
 def test_events_do_not_chatter(name: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run has as many events as a healthy one, and a few dozen for the failure and the start of the other lane."""
-    courses: list[trajectory.Trajectory] = []
-    made = trajectory.Course.__init__
-
-    def noted(self: trajectory.Course, *arguments: object) -> None:
-        made(self, *arguments)  # type: ignore[arg-type]
-        courses.append(self.struct)
-
-    monkeypatch.setattr(trajectory.Course, "__init__", noted)
+    courses = noted_courses(monkeypatch)
     redundant({} if name is None else FAILURES[name].values, -30.0, 55e3)
     assert 0 < courses[-1].events < (25 if name is None else 80)
     assert courses[-1].steps < 600

@@ -43,9 +43,6 @@ def make_sources(model: CausalModel, fmi: int) -> Sources:
     for path in sorted(RUNTIME.glob("*.[ch]")):
         if not path.name.startswith(other):
             files[path.name] = path.read_bytes()
-    if model.blocks or model.initial_blocks:
-        # the mended solver; archives without implicit equations keep the file that they were built with
-        files["newton.c"] = (RUNTIME / "implicit" / "newton.c").read_bytes()
     headers = Path(fmpy.__file__).parent / "c-code"
     files |= {header: (headers / header).read_bytes() for header in _HEADERS[fmi]}
     describe = fmi2_description if fmi == 2 else fmi3_description

@@ -6,7 +6,8 @@ or ``break`` leaves the rest to the others, which go on as if it had not been ta
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from thsa_cosim.errors import ModelicaError
@@ -19,6 +20,7 @@ MOST_TURNS = 100_000
 MOST_UNKNOWN = 200  # turns of a loop whose end is not known at export
 
 Env = dict[str, Value]  # values by name
+Step = Callable[[Env], "tuple[Env | None, list[_Exit]]"]
 
 
 class _Unset:
@@ -63,12 +65,16 @@ class Statements:
 
     def _sequence(self, statements: Sequence[Equation], env: Env) -> tuple[Env | None, list[_Exit]]:
         """The environment where nothing leaves, None if something always does, and the exits in their order."""
+        return self._in_turn([partial(self._statement, statement) for statement in statements], dict(env))
+
+    def _in_turn(self, steps: Iterable[Step], env: Env) -> tuple[Env | None, list[_Exit]]:
+        """Each step where those before it have not left."""
         exits: list[_Exit] = []
-        live: Env | None = dict(env)
+        live: Env | None = env
         outer = self.guard
-        for statement in statements:
+        for step in steps:
             assert live is not None
-            live, more = self._statement(statement, live)
+            live, more = step(live)
             exits += more
             if live is None:
                 break
@@ -222,18 +228,12 @@ class Statements:
         if rest:
             body = [Equation("for", (tuple(rest), body), statement.line)]
         where = Syntax("number", (0,), statement.line)
-        exits: list[_Exit] = []
-        live: Env | None = env
-        outer = self.guard
-        for value in self._at(env).iterated(name, values, where):
-            assert live is not None
-            live, more = self._sequence(body, {**live, name: value})
-            exits += more
-            if live is None:
-                break
-            for leaving in more:
-                self.guard = make("and", self.guard, make("not", leaving.condition))
-        self.guard = outer
+
+        def turn(value: Value, live: Env) -> tuple[Env | None, list[_Exit]]:
+            return self._sequence(body, {**live, name: value})
+
+        through = self._at(env).iterated(name, values, where)
+        live, exits = self._in_turn([partial(turn, value) for value in through], env)
         live, exits = self._after_loop(live, exits, statement.line)
 
         def restored(after: Env) -> Env:

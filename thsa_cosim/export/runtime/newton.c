@@ -19,7 +19,7 @@ int newton_linear(int n, int columns, double *matrix, double *b, int *pivot) {
         pivot[k] = best;
         if (!(fabs(col[best]) > 0.0) || col[best] - col[best] != 0.0) return 1;
         if (best != k)
-            for (int j = 0; j < n; j++) {
+            for (int j = k; j < n; j++) { /* factors found already stay: the right sides are swapped in this order, too */
                 const double swap = matrix[j * n + k];
                 matrix[j * n + k] = matrix[j * n + best];
                 matrix[j * n + best] = swap;
@@ -95,7 +95,7 @@ int newton_solve(int n, double *y, Residual residual, const Point *at, double *w
             if (good) {
                 again(n, matrix, pivot, next);
                 good = all_numbers(n, next);
-                correction = size_of(n, next, y);
+                correction = size_of(n, next, from); /* in the units of the step, or the two cannot be compared */
             }
             if (good && (correction <= (1.0 - 0.25 * lambda) * length || correction < 1e-13)) {
                 if (lambda == 1.0 && correction < 1e-10) { /* the simplified correction is exact enough to be taken */

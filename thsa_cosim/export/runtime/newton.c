@@ -10,6 +10,20 @@
 
 enum { MOST_TURNS = 200, MOST_HALVINGS = 40 };
 
+/* v becomes the solution for one right-hand side, given the LU factors in matrix. */
+static void substitute(int n, const double *matrix, const int *pivot, double *v) {
+    for (int k = 0; k < n; k++) {
+        const double swap = v[k];
+        v[k] = v[pivot[k]];
+        v[pivot[k]] = swap;
+        for (int i = k + 1; i < n; i++) v[i] -= matrix[k * n + i] * v[k];
+    }
+    for (int k = n - 1; k >= 0; k--) {
+        v[k] /= matrix[k * n + k];
+        for (int i = 0; i < k; i++) v[i] -= matrix[k * n + i] * v[k];
+    }
+}
+
 int newton_linear(int n, int columns, double *matrix, double *b, int *pivot) {
     for (int k = 0; k < n; k++) {
         double *col = matrix + k * n;
@@ -19,7 +33,7 @@ int newton_linear(int n, int columns, double *matrix, double *b, int *pivot) {
         pivot[k] = best;
         if (!(fabs(col[best]) > 0.0) || col[best] - col[best] != 0.0) return 1;
         if (best != k)
-            for (int j = k; j < n; j++) { /* factors found already stay: the right sides are swapped in this order, too */
+            for (int j = k; j < n; j++) { /* factors found already stay: substitute() swaps in this order, too */
                 const double swap = matrix[j * n + k];
                 matrix[j * n + k] = matrix[j * n + best];
                 matrix[j * n + best] = swap;
@@ -31,34 +45,8 @@ int newton_linear(int n, int columns, double *matrix, double *b, int *pivot) {
             for (int i = k + 1; i < n; i++) matrix[j * n + i] -= factor * col[i];
         }
     }
-    for (int c = 0; c < columns; c++) {
-        double *v = b + c * n;
-        for (int k = 0; k < n; k++) {
-            const double swap = v[k];
-            v[k] = v[pivot[k]];
-            v[pivot[k]] = swap;
-            for (int i = k + 1; i < n; i++) v[i] -= matrix[k * n + i] * v[k];
-        }
-        for (int k = n - 1; k >= 0; k--) {
-            v[k] /= matrix[k * n + k];
-            for (int i = 0; i < k; i++) v[i] -= matrix[k * n + i] * v[k];
-        }
-    }
+    for (int c = 0; c < columns; c++) substitute(n, matrix, pivot, b + c * n);
     return 0;
-}
-
-/* LU factors in matrix: one more right-hand side. */
-static void again(int n, const double *matrix, const int *pivot, double *v) {
-    for (int k = 0; k < n; k++) {
-        const double swap = v[k];
-        v[k] = v[pivot[k]];
-        v[pivot[k]] = swap;
-        for (int i = k + 1; i < n; i++) v[i] -= matrix[k * n + i] * v[k];
-    }
-    for (int k = n - 1; k >= 0; k--) {
-        v[k] /= matrix[k * n + k];
-        for (int i = 0; i < k; i++) v[i] -= matrix[k * n + i] * v[k];
-    }
 }
 
 static double size_of(int n, const double *step, const double *y) {
@@ -93,7 +81,7 @@ int newton_solve(int n, double *y, Residual residual, const Point *at, double *w
             for (int i = 0; i < n; i++) y[i] = from[i] - lambda * step[i];
             good = !residual(at, next, NULL) && all_numbers(n, next);
             if (good) {
-                again(n, matrix, pivot, next);
+                substitute(n, matrix, pivot, next);
                 good = all_numbers(n, next);
                 correction = size_of(n, next, from); /* in the units of the step, or the two cannot be compared */
             }

@@ -141,8 +141,9 @@ def try_input_handling(experiment: Experiment, *, deadline_s: float | None = 60.
         if reason or coarse.signals is None or half.signals is None:
             ways.append(Way(mode, np.inf, np.inf, "", reason))
             continue
-        error, worst = largest_change(reference, coarse.signals.values)
-        halved, _ = largest_change(reference, {n: v[::2] for n, v in half.signals.values.items()})
+        error, worst = largest_change(reference, coarse.signals.values, jumps=True)
+        at_points = {n: v[::2] for n, v in half.signals.values.items()}
+        halved, _ = largest_change(reference, at_points, jumps=True)
         ways.append(Way(mode, error, halved, worst))
     confirmed = source == "Model Exchange" and (
         not any(np.isfinite(w.error) for w in ways) or any(w.is_consistent for w in ways)
@@ -163,21 +164,45 @@ def refined(time: FloatArray, parts: int) -> FloatArray:
 
 
 def largest_change(
-    reference: Mapping[str, FloatArray], found: Mapping[str, FloatArray], names: Sequence[str] | None = None
+    reference: Mapping[str, FloatArray],
+    found: Mapping[str, FloatArray],
+    names: Sequence[str] | None = None,
+    *,
+    jumps: bool = False,
 ) -> tuple[float, str]:
     """Return the largest deviation over all signals, relative to each one's range, and whose it is.
 
     A range counts as at least 1e-9 of the signal's size, and of 1e-9 of the largest signal of its kind: a signal that
-    is zero but for rounding is no reason for alarm.
+    is zero but for rounding is no reason for alarm. ``jumps``: a signal may jump a sample earlier or later, as events
+    do that fall between two communication points.
     """
     changes = {}
     for name in names or reference:
-        difference = float(np.max(np.abs(found[name] - reference[name])))
+        deviation = np.abs(found[name] - reference[name])
         size = float(np.max(np.abs(reference[name])))
         scale = max(float(np.ptp(reference[name])), _FLOOR * size, _TINY)
+        if jumps and float(np.max(deviation)) > _JUMP * scale:
+            deviation = _beside_jumps(reference[name], found[name], deviation, scale)
+        difference = float(np.max(deviation))
         changes[name] = difference / scale if difference > _FLOOR * size + _TINY else 0.0
     worst = max(changes, key=lambda name: changes[name])
     return changes[worst], worst
+
+
+_JUMP, _MOST_JUMPS = 0.1, 0.25
+"""Share of its range that a signal jumps by; share of samples next to jumps above which it is no signal with jumps."""
+
+
+def _beside_jumps(
+    reference: FloatArray, found: FloatArray, deviation: FloatArray, scale: float
+) -> FloatArray:
+    """The deviation (n,); next to a jump of the reference that from the nearest of a sample and its neighbours."""
+    padded = np.pad(reference, 1, mode="edge")
+    around = np.stack([padded[:-2], reference, padded[2:]])
+    beside = np.ptp(around, axis=0) > _JUMP * scale
+    if np.mean(beside) > _MOST_JUMPS:
+        return deviation
+    return np.asarray(np.where(beside, np.abs(around - found).min(axis=0), deviation))
 
 
 _TINY = 1e-12

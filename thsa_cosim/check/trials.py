@@ -6,9 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome
+from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
 from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined, try_input_handling
 from thsa_cosim.check import coupling, numerics
+from thsa_cosim.check.budget import LONGEST_RUN, SLOW_SHARES, Budget, is_slow
 from thsa_cosim.check.excitation import Excitation
 from thsa_cosim.check.finding import Finding, Verdict
 from thsa_cosim.fmu import FmuDescription, probe
@@ -23,11 +24,14 @@ _LEAK_BYTES = 2048
 """Growth per cycle that counts as a leak; an interpreter alone stays well below."""
 _SHORT = 200
 """Communication points of a run that is repeated to watch memory."""
+_CYCLES = 50
 _ONE_BY_ONE = 60
 """Parameters, and inputs, that are tried one by one at most."""
 _MANY_STEPS = 20_000
 _LONG = 3000
 _LARGER = (10.0, 100.0)
+_PARTS = (4, 8, 16, 32)
+"""Into how many parts a step is divided that turns out to be too long."""
 
 
 class Trials:
@@ -55,6 +59,7 @@ class Trials:
         self._handling: HandlingTrial | None = None
         self._first = Signals(self._time, {})
         self._halves = True
+        self._budget = Budget()
         self._changed = {
             name: value
             for name, value in probe.changed_parameters(description).items()
@@ -104,7 +109,7 @@ class Trials:
             self._experiment("halved", probe.halved(self._time)),
             self._experiment("doubled", self._time[::2] if len(self._time) > 2 else self._time),
             replace(
-                self._experiment("short", self._time[: max(2, min(len(self._time), _SHORT))]),
+                self._experiment("short", self._time[: self._short_points()]),
                 reduce=probe.footprint,
             ),
             *more,
@@ -118,6 +123,12 @@ class Trials:
             backend=("python" if len(self._time) < _LONG else None) if backend == "auto" else backend,
             recycle_growth_mb=1e6,
         )
+
+    def _short_runs(self, cycles: int) -> int:
+        return self._budget.runs(_WARM_UP + cycles, self._short_points())
+
+    def _short_points(self) -> int:
+        return self._budget.points_for(_WARM_UP + _CYCLES, min(len(self._time), _SHORT))
 
     # -- lines ------------------------------------------------------------------------------------------
     def description_lines(self) -> None:
@@ -148,26 +159,18 @@ class Trials:
         later = ("fresh instance", "new process", "reset", "communication step", "memory", "file handles")
         if not self._outputs:
             self._note(
-                "runs", Verdict.NOT_TRIED, "it has no floating-point output or local variable to watch"
+                "runs",
+                Verdict.NOT_TRIED,
+                "it has no number among its outputs, states and local variables to watch",
             )
             return False
-        doubt = ""
-        outcome = self._try()
-        if not outcome.ok and self._may_be_cut():
-            whole, reason = self._time, outcome.reason
-            self._time = self._given.communication_points(self._description, cut=True)
-            self._inputs = self._excited()
-            outcome = self._try()
-            if outcome.ok:
-                done = f"{np.ptp(self._time):g} s of {np.ptp(whole):g} s"
-                doubt = f"; only {done}, as it fails in longer steps ({reason})"
-        if not outcome.ok and self._given.kind is None and self._kind == "co-simulation":
-            outcome, doubt = self._fall_back(outcome)
+        outcome, doubt = self._first_outcome()
         if not outcome.ok or outcome.signals is None:
             self._note("runs", Verdict.FAILED, f"{outcome.status}: {outcome.reason}")
             for name in later:
                 self._note(name, Verdict.NOT_TRIED, "the first run failed")
             return False
+        self._budget = Budget(outcome.duration_s, len(self._time))
         self._first = outcome.signals
         if (judged := numerics.judge_first_values(self._first)) is not None:
             self._take("first values", judged)
@@ -176,12 +179,57 @@ class Trials:
         self._note(
             "runs",
             Verdict.OK if does and not doubt else Verdict.WARNING,
-            f"{self._kind}, {np.ptp(self._time):g} s in {steps} steps, {self._moved()}{doubt}"
+            f"{self._kind}, {np.ptp(self._time):g} s in {steps} steps{self._whose_duration()}, {self._moved()}{doubt}"
             + ("" if does else "; no output moves, so what follows shows little"),
             duration_s=outcome.duration_s,
             steps=steps,
         )
         return True
+
+    def _first_outcome(self) -> tuple[Outcome, str]:
+        """The first run that succeeds, whole if possible, and what is to be said where it is not."""
+        whole = self._time
+        outcome = self._try()
+        reason, doubt = outcome.reason, ""
+        free = self._given.time is None and self._given.duration is None
+        if outcome.status is Status.TIMEOUT and free:
+            outcome, doubt = self._cut_to_what_is_fast(outcome)
+        elif not outcome.ok and self._may_be_cut():
+            self._shorten(self._given.communication_points(self._description, cut=True))
+            outcome = self._try()
+            done = f"{np.ptp(self._time):g} s of {np.ptp(whole):g} s"
+            doubt = f"; only {done}, as it fails in longer steps ({reason})"
+        if not outcome.ok and self._given.kind is None and self._kind == "co-simulation":
+            self._shorten(whole)
+            outcome, doubt = self._fall_back(outcome)
+        return outcome, doubt
+
+    def _shorten(self, time: FloatArray) -> None:
+        self._time = time
+        self._inputs = self._excited()
+
+    def _cut_to_what_is_fast(self, killed: Outcome) -> tuple[Outcome, str]:
+        """Run the begin of an experiment that outlasts the deadline, unless it hangs there."""
+        whole = self._time
+        for share in SLOW_SHARES:
+            points = max(int(share * len(whole)), 2)
+            self._shorten(whole[:points])
+            outcome = self._run_once()
+            if outcome.status is Status.TIMEOUT:
+                continue
+            if not outcome.ok or not is_slow(outcome.duration_s, share, self._deadline):
+                break
+            fast = int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))
+            self._shorten(whole[:fast])
+            outcome = self._try()
+            done = f"{np.ptp(self._time):.3g} s of {np.ptp(whole):g} s"
+            return outcome, f"; only {done}: all of it takes more than {self._deadline:g} s (see --deadline)"
+        return killed, ""
+
+    def _whose_duration(self) -> str:
+        stop = self._description.default_experiment.stop
+        given = self._given.duration is not None or self._given.time is not None
+        return "" if given or stop is not None else " (it declares no stop time: see --duration)"
 
     def _moved(self) -> str:
         if self._given.inputs is not None:
@@ -238,7 +286,8 @@ class Trials:
         elif self._kind == "model-exchange" or self._handling is not None:
             trial = self._handling or HandlingTrial("", (), True)
             self._take("inputs", numerics.judge_handling(trial, self._kind))
-        names = [v.name for v in probe.excitable(self._description)][:_ONE_BY_ONE]
+        every = [v.name for v in probe.excitable(self._description)]
+        names = every[: self._budget.runs(_ONE_BY_ONE)]
         if self._given.inputs is not None or len(names) < 2:
             return
         still = Signals(
@@ -250,14 +299,17 @@ class Trials:
             outcomes = runner.run([Job(e.name) for e in alone])
         if outcomes[0].signals is not None:
             changed = dict(zip(names, outcomes[1:], strict=True))
-            self._take("each input", numerics.judge_changes(outcomes[0].signals, changed, "inputs"))
+            untried = len(every) - len(names)
+            judged = numerics.judge_changes(outcomes[0].signals, changed, "inputs", untried)
+            self._take("each input", judged)
 
     def start_value_line(self) -> None:
         """Change one start value after the other: each must change something, compared with a fresh instance."""
         name = "start values"
         changed = probe.changed_parameters(self._description, zeros=True)
         named = self._given.parameters or tuple(n for n in changed if n not in self._values)
-        tried = {n: changed[n] for n in named[:_ONE_BY_ONE] if n in changed}
+        most = self._budget.runs(_ONE_BY_ONE)
+        tried = {n: changed[n] for n in named[:most] if n in changed}
         if not tried:
             self._note(name, Verdict.NOT_TRIED, "it has no parameter to change")
             return
@@ -275,7 +327,8 @@ class Trials:
         if repeats and (judged := numerics.judge_declared(self._first, as_declared)) is not None:
             self._take("declared values", judged)
         found = dict(zip(tried, outcomes, strict=True))
-        self._take(name, numerics.judge_changes(self._first, found, "start values"))
+        untried = sum(n in changed for n in named[most:])
+        self._take(name, numerics.judge_changes(self._first, found, "start values", untried))
 
     def fresh_lines(self, cycles: int) -> bool:
         """Use a new instance per run; return whether the FMU runs with other start values."""
@@ -295,7 +348,7 @@ class Trials:
                 for name in ("memory over instances", "file handles over instances"):
                     self._note(name, Verdict.NOT_TRIED, "there is one instance per process")
             else:
-                self._leak_lines("instances", runner.run([Job("short")] * (_WARM_UP + cycles)))
+                self._leak_lines("instances", runner.run([Job("short")] * self._short_runs(cycles)))
             return runner.run([Job("trial", self._changed)])[0].ok
 
     def reset_lines(self, cycles: int, runs_changed: bool) -> None:
@@ -313,7 +366,7 @@ class Trials:
             else:
                 why = "it does not run with other start values" if self._changed else "it has none to change"
                 self._note(name, Verdict.NOT_TRIED, why)
-            self._leak_lines("resets", runner.run([Job("short")] * (_WARM_UP + cycles)))
+            self._leak_lines("resets", runner.run([Job("short")] * self._short_runs(cycles)))
 
     def _step_lines(self, halved: Outcome, doubled: Outcome) -> None:
         name = "communication step"
@@ -328,10 +381,22 @@ class Trials:
         fixed = not self._description.capabilities.get("canHandleVariableCommunicationStepSize")
         judged = numerics.judge_step(self._first, halved, step, fixed)
         self._halves = halved.ok
+        if judged[0] is Verdict.FAILED:
+            judged = numerics.judge_shorter_steps(judged, [(step / 2, halved), *self._shorter_runs(step)])
         self._take(name, judged)
         if len(self._time) > 2 and self._given.inputs is None:  # else the step is the user's
             change = judged[2].get("change", 0.0)
             self._take("longer step", numerics.judge_longer_step(self._first, doubled, step, change))
+
+    def _shorter_runs(self, step: float) -> list[tuple[float, Outcome]]:
+        """Runs with a quarter of the step and less, as far as they are affordable."""
+        parts = [n for n in _PARTS if self._budget.run_s * n < LONGEST_RUN * 10]
+        finer = [self._experiment(f"h/{n}", refined(self._time, n)) for n in parts]
+        if not finer:
+            return []
+        with self._runner(more=finer) as runner:
+            outcomes = runner.run([Job(e.name) for e in finer])
+        return [(step / n, outcome) for n, outcome in zip(parts, outcomes, strict=True)]
 
     def larger_inputs_line(self) -> None:
         """Inputs of which nobody says how large they are: try larger ones, too."""
@@ -375,7 +440,7 @@ class Trials:
             self._note(memory, Verdict.FAILED, f"{failed.status}: {failed.reason}")
             self._note(files, Verdict.NOT_TRIED, "a run failed")
             return
-        prints = np.array([outcome.reduced for outcome in outcomes])[_WARM_UP:]
+        prints = np.array([outcome.reduced for outcome in outcomes])[min(_WARM_UP, len(outcomes) // 2) :]
         if not np.isfinite(prints).all():
             for name in (memory, files):
                 self._note(name, Verdict.NOT_TRIED, "this platform does not tell")

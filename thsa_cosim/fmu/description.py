@@ -4,6 +4,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import IO, Any
 from xml.etree import ElementTree
@@ -12,6 +13,7 @@ import numpy as np
 
 from thsa_cosim.errors import FmuError, did_you_mean
 from thsa_cosim.fmu.archive import open_archive, read_text, sha256_of
+from thsa_cosim.fmu.clocks import Clock, read_clocks
 
 FLOAT_TYPES = ("Real", "Float64", "Float32")
 INTEGERS = tuple(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))
@@ -120,6 +122,8 @@ class FmuDescription:
     event_indicators: int = 0
     state_references: tuple[tuple[int, int], ...] = ()
     """(state, its derivative) as value references, in the order of the state vector; empty if unknown."""
+    clocks: tuple[Clock, ...] = ()
+    """FMI 3 input clocks."""
     feedthrough: Mapping[str, tuple[str, ...] | None] = field(default_factory=dict)
     """What each output depends on directly, by name (ModelStructure, FMI 2.0.4 clause 2.2.8); None: not said."""
 
@@ -141,6 +145,12 @@ class FmuDescription:
             for v in self.variables.values()
             if v.causality in ("parameter", "structuralParameter") and (v.is_scalar or v.is_alias)
         )
+
+    @cached_property
+    def structural_references(self) -> frozenset[int]:
+        """Value references of structural parameters (FMI 3)."""
+        found = (v for v in self.variables.values() if v.causality == "structuralParameter")
+        return frozenset(v.value_reference for v in found if v.element is None)
 
     def variable(self, name: str) -> Variable:
         """Return the variable ``name``; FmuError with a suggestion if there is none."""
@@ -211,6 +221,7 @@ def read_description(path: Path | str) -> FmuDescription:
         states=_count(raw.derivatives, raw) or int(raw.numberOfContinuousStates or 0),
         event_indicators=_count(raw.eventIndicators, raw) or int(raw.numberOfEventIndicators or 0),
         state_references=_state_references(raw),
+        clocks=read_clocks(xml),
         feedthrough={
             unknown.variable.name: None
             if unknown.dependencies is None

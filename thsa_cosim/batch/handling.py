@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.local import LocalRunner
@@ -173,8 +174,8 @@ def largest_change(
     """Return the largest deviation over all signals, relative to each one's range, and whose it is.
 
     A range counts as at least 1e-9 of the signal's size, and of 1e-9 of the largest signal of its kind: a signal that
-    is zero but for rounding is no reason for alarm. ``jumps``: a signal may jump a sample earlier or later, as events
-    do that fall between two communication points.
+    is zero but for rounding is no reason for alarm. ``jumps``: a signal may jump a little earlier or later, as events
+    do that fall between communication points, and one that switches all the time is compared by its integral.
     """
     changes = {}
     for name in names or reference:
@@ -189,20 +190,29 @@ def largest_change(
     return changes[worst], worst
 
 
-_JUMP, _MOST_JUMPS = 0.1, 0.25
-"""Share of its range that a signal jumps by; share of samples next to jumps above which it is no signal with jumps."""
+_JUMP = 0.1
+"""Share of its range that a signal jumps by between two samples."""
+_SWITCHING = 0.1
+"""Share of samples with a jump from which on a signal switches all the time."""
+_SHIFT = 0.003
+"""Share of all samples that a jump may come earlier or later; a sample at least."""
 
 
 def _beside_jumps(
     reference: FloatArray, found: FloatArray, deviation: FloatArray, scale: float
 ) -> FloatArray:
-    """The deviation (n,); next to a jump of the reference that from the nearest of a sample and its neighbours."""
-    padded = np.pad(reference, 1, mode="edge")
-    around = np.stack([padded[:-2], reference, padded[2:]])
-    beside = np.ptp(around, axis=0) > _JUMP * scale
-    if np.mean(beside) > _MOST_JUMPS:
-        return deviation
-    return np.asarray(np.where(beside, np.abs(around - found).min(axis=0), deviation))
+    """The deviation (n,); near a jump that from the nearest sample around; of a signal that switches its mean's."""
+    jumps = np.abs(np.diff(reference)) > _JUMP * scale
+    if np.mean(jumps) > _SWITCHING:
+        together = np.cumsum(reference - reference[0])
+        return np.asarray(np.abs(np.cumsum(found - reference)) * scale / max(float(np.ptp(together)), _TINY))
+    reach = max(1, round(_SHIFT * reference.size))
+    near = np.zeros(reference.size, dtype=bool)
+    for k in np.flatnonzero(jumps).tolist():
+        near[max(k - reach + 1, 0) : k + reach + 1] = True
+    around = sliding_window_view(np.pad(reference, reach, mode="edge"), 2 * reach + 1)
+    nearest = np.abs(around - found[:, None]).min(axis=1)
+    return np.asarray(np.where(near, nearest, deviation))
 
 
 _TINY = 1e-12

@@ -30,6 +30,8 @@ _ONE_BY_ONE = 60
 _MANY_STEPS = 20_000
 _LONG = 3000
 _LARGER = (10.0, 100.0)
+_BY_INPUTS = (Status.NOT_FINITE, Status.FMI_ERROR, Status.FMI_DISCARD, Status.INCOMPLETE)
+"""How a run may fail because its inputs ask too much."""
 _PARTS = (4, 8, 16, 32)
 """Into how many parts a step is divided that turns out to be too long."""
 
@@ -60,6 +62,7 @@ class Trials:
         self._first = Signals(self._time, {})
         self._halves = True
         self._budget = Budget()
+        self._rests = False
         self._changed = {
             name: value
             for name, value in probe.changed_parameters(description).items()
@@ -67,11 +70,17 @@ class Trials:
         }
         self.findings: list[Finding] = []
 
-    def _excited(self, *, times: float = 1.0, only: str | None = None) -> Signals | None:
+    def _excited(
+        self, *, times: float = 1.0, only: str | None = None, time: FloatArray | None = None
+    ) -> Signals | None:
         if self._given.inputs is not None:
             return self._given.inputs
         return probe.kinked_inputs(
-            self._description, self._time, ends=self._given.ends, times=times, only=only
+            self._description,
+            self._time if time is None else time,
+            ends=self._given.ends,
+            times=times,
+            only=only,
         )
 
     def _note(self, name: str, verdict: Verdict, text: str, **values: float) -> None:
@@ -202,7 +211,27 @@ class Trials:
         if not outcome.ok and self._given.kind is None and self._kind == "co-simulation":
             self._shorten(whole)
             outcome, doubt = self._fall_back(outcome)
+        if not outcome.ok and outcome.status in _BY_INPUTS:
+            outcome, doubt = self._at_rest(outcome)
         return outcome, doubt
+
+    def _at_rest(self, failed: Outcome) -> tuple[Outcome, str]:
+        """Hold inputs of which nobody said where they run: does it fail because of them?"""
+        if self._given.inputs is not None or self._inputs is None or self._given.ends:
+            return failed, ""
+        moving, self._inputs = self._inputs, self._still()
+        outcome = self._try()
+        if outcome.ok:
+            self._rests = True
+            doubt = f"; with inputs that move it fails ({failed.reason}): say how far they run (--input NAME=VALUE)"
+            return outcome, doubt
+        self._inputs = moving
+        return replace(failed, reason=f"{failed.reason}; with its inputs at rest it fails, too"), ""
+
+    def _still(self) -> Signals:
+        assert self._inputs is not None
+        held = {n: np.full(len(self._time), v[0]) for n, v in self._inputs.values.items()}
+        return Signals(self._time, held)
 
     def _shorten(self, time: FloatArray) -> None:
         self._time = time
@@ -235,7 +264,9 @@ class Trials:
         if self._given.inputs is not None:
             return "the given inputs"
         if self._inputs is None:
-            return "no inputs to move"
+            return "no floating-point inputs to move"
+        if self._rests:
+            return "inputs at their start values"
         return "inputs ramping away from their start values, with kinks"
 
     def _try(self) -> Outcome:
@@ -260,7 +291,9 @@ class Trials:
         return given.time is None and given.step is None and given.duration is None and self._was_coarsened()
 
     def _was_coarsened(self) -> bool:
-        return len(self._given.communication_points(self._description, cut=True)) != len(self._time)
+        """Whether the steps are longer than what the FMU declares, so that the stop time is reached."""
+        declared = self._given.communication_points(self._description, cut=True)
+        return bool(self._time[1] - self._time[0] > 1.001 * (declared[1] - declared[0]))
 
     def _fall_back(self, failed: Outcome) -> tuple[Outcome, str]:
         """Try Model Exchange where Co-Simulation does not run."""
@@ -276,7 +309,7 @@ class Trials:
     def inputs_lines(self) -> None:
         """Say how inputs are given, and which of them do something."""
         if self._inputs is None:
-            self._note("inputs", Verdict.OK, "it has none that run linearly")
+            self._note("inputs", Verdict.OK, "it has none that are floating-point numbers")
             return
         if is_ours(self._description):
             mode = input_modes(self._description, probe.excitable(self._description))[-1]
@@ -288,12 +321,9 @@ class Trials:
             self._take("inputs", numerics.judge_handling(trial, self._kind))
         every = [v.name for v in probe.excitable(self._description)]
         names = every[: self._budget.runs(_ONE_BY_ONE)]
-        if self._given.inputs is not None or len(names) < 2:
+        if self._given.inputs is not None or self._rests or len(names) < 2:
             return
-        still = Signals(
-            self._time, {n: np.full(len(self._time), v[0]) for n, v in self._inputs.values.items()}
-        )
-        alone = [self._experiment("none", self._time, still)]
+        alone = [self._experiment("none", self._time, self._still())]
         alone += [self._experiment(f"input {n}", self._time, self._excited(only=n)) for n in names]
         with self._runner(more=alone) as runner:
             outcomes = runner.run([Job(e.name) for e in alone])
@@ -381,12 +411,29 @@ class Trials:
         fixed = not self._description.capabilities.get("canHandleVariableCommunicationStepSize")
         judged = numerics.judge_step(self._first, halved, step, fixed)
         self._halves = halved.ok
+        if judged[0] is not Verdict.OK and self._may_be_cut():
+            self._take(name, self._declared_step(step, fixed))
+            return
         if judged[0] is Verdict.FAILED:
             judged = numerics.judge_shorter_steps(judged, [(step / 2, halved), *self._shorter_runs(step)])
         self._take(name, judged)
         if len(self._time) > 2 and self._given.inputs is None:  # else the step is the user's
             change = judged[2].get("change", 0.0)
             self._take("longer step", numerics.judge_longer_step(self._first, doubled, step, change))
+
+    def _declared_step(self, coarse: float, fixed: bool) -> numerics.Judged:
+        """Halve the step that the FMU declares, over the begin of the experiment."""
+        time = self._given.communication_points(self._description, cut=True)
+        step, inputs = float(time[1] - time[0]), self._excited(time=time)
+        grids = {"declared": time, "declared/2": probe.halved(time)}
+        with self._runner(more=[self._experiment(n, t, inputs) for n, t in grids.items()]) as runner:
+            whole, halved = runner.run([Job(name) for name in grids])
+        if whole.signals is None:
+            text = f"{coarse:g} s is too long, and its own {step:g} s fails: {whole.status}: {whole.reason}"
+            return Verdict.FAILED, text, {}
+        verdict, text, values = numerics.judge_step(whole.signals, halved, step, fixed)
+        text = f"{text}, over {np.ptp(time):g} s; {coarse:g} s, with which the stop time was reached, is too long"
+        return verdict, text, values
 
     def _shorter_runs(self, step: float) -> list[tuple[float, Outcome]]:
         """Runs with a quarter of the step and less, as far as they are affordable."""
@@ -402,7 +449,13 @@ class Trials:
         """Inputs of which nobody says how large they are: try larger ones, too."""
         unknown = [v for v in probe.excitable(self._description) if probe.is_undeclared(v)]
         unknown = [v for v in unknown if v.name not in self._given.ends]
-        if self._given.inputs is not None or not unknown or self._kind != "co-simulation" or not self._halves:
+        if (
+            self._given.inputs is not None
+            or self._rests
+            or not unknown
+            or self._kind != "co-simulation"
+            or not self._halves
+        ):
             return
         if is_ours(self._description):  # it controls its own step
             return

@@ -124,6 +124,8 @@ class FmuDescription:
     """(state, its derivative) as value references, in the order of the state vector; empty if unknown."""
     clocks: tuple[Clock, ...] = ()
     """FMI 3 input clocks."""
+    dimension_references: frozenset[int] = frozenset()
+    """FMI 3: value references of the structural parameters that are lengths of arrays."""
     feedthrough: Mapping[str, tuple[str, ...] | None] = field(default_factory=dict)
     """What each output depends on directly, by name (ModelStructure, FMI 2.0.4 clause 2.2.8); None: not said."""
 
@@ -222,6 +224,12 @@ def read_description(path: Path | str) -> FmuDescription:
         event_indicators=_count(raw.eventIndicators, raw) or int(raw.numberOfEventIndicators or 0),
         state_references=_state_references(raw),
         clocks=read_clocks(xml),
+        dimension_references=frozenset(
+            int(d.valueReference)
+            for v in raw.modelVariables
+            for d in v.dimensions or ()
+            if d.valueReference is not None
+        ),
         feedthrough={
             unknown.variable.name: None
             if unknown.dependencies is None

@@ -50,7 +50,8 @@ class _Stepping:
         self.instance, self.plan, self.progress = instance, plan, progress
         self.schedule = Schedule(instance, instance.description.clocks, start)
         self.inputs = sampled(plan.inputs, plan.input_variables, plan.grid.times)
-        self.smooth = np.array([v.is_float and v.variability == "continuous" for v in plan.input_variables])
+        smooth = [v.is_float and v.variability == "continuous" for v in plan.input_variables]
+        self.smooth = np.array(smooth, dtype=bool)
         self.channels = [
             part for channel in plan.input_channels if (part := _part(channel, self.smooth)) is not None
         ]

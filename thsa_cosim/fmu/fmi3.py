@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from thsa_cosim.errors import ParameterError
 from thsa_cosim.fmu.arrays import ArrayAccess
 from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.instance import ELEMENTS, Channel, EventInfo, Instance
@@ -36,6 +37,7 @@ class Fmi3Instance(Instance):
         "Enumeration": ("Int64", np.int64),
         "Boolean": ("Boolean", np.bool_),
     }
+    step_types = (ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_bool, *(ctypes.c_void_p,) * 4)
     environment = 0
     """Address handed to the callbacks."""
     intermediate_update = 0
@@ -124,6 +126,11 @@ class Fmi3Instance(Instance):
                 Status.INCOMPLETE, f"the FMU {what} at t = {time:.9g} s{self.messages.last()}"
             )
 
+    def part_of_step(self, time: float, step: float) -> float | None:
+        """fmi3DoStep; the last successful time, None where the FMU asks to terminate."""
+        reached, _, terminate = self.step(time, step)
+        return None if terminate else reached
+
     def step(self, time: float, step: float) -> tuple[float, bool, bool]:
         """fmi3DoStep; return (last successful time [s], event handling needed, terminate)."""
         flags, last = (ctypes.c_bool * 3)(), ctypes.c_double(np.nan)
@@ -187,6 +194,7 @@ class Fmi3Instance(Instance):
             for c in channels
         ]
         if any(part.any() for part in inside):
+            self._refuse_sizes(_parts(channels, inside), values)
             self.call("EnterConfigurationMode")
             self.set_values(_parts(channels, inside), values)
             self.call("ExitConfigurationMode")
@@ -245,6 +253,18 @@ class Fmi3Instance(Instance):
             (pointer, out.ctypes.data),
             (size, len(out)),
         )
+
+    def _refuse_sizes(self, channels: Sequence[Channel], values: FloatArray) -> None:
+        """ParameterError where the length of an array would change: its elements are named by the declared one."""
+        declared = {v.value_reference: v for v in self.description.variables.values() if v.element is None}
+        for channel in channels:
+            for reference, column in zip(channel.references.tolist(), channel.columns, strict=True):
+                variable = declared[reference]
+                if reference in self.description.dimension_references and values[column] != variable.start:
+                    raise ParameterError(
+                        f"{self.description.path}: {variable.name} is the length of an array and keeps its start value"
+                        f" {variable.start:g}; export the FMU with another one."
+                    )
 
 
 def _parts(channels: Sequence[Channel], kept: Sequence[NDArray[np.bool_]]) -> list[Channel]:

@@ -65,6 +65,8 @@ class Instance(ABC):
     prefix: str
     types: ClassVar[dict[str, tuple[str, Any]]]
     """FMI data type -> (function suffix, numpy type)"""
+    step_types: ClassVar[tuple[Any, ...]] = ()
+    """Prototype of doStep."""
 
     def __init__(
         self, folder: Path, description: FmuDescription, kind: str, sink: MessageSink | None = None
@@ -106,6 +108,11 @@ class Instance(ABC):
     @abstractmethod
     def do_step(self, time: float, step: float) -> None:
         """Go from ``time`` to ``time + step`` [s] (Co-Simulation), inputs as they were last set."""
+
+    def part_of_step(self, time: float, step: float) -> float | None:
+        """Like ``do_step``, where less may be done; the time [s] that was reached, None if that is not known."""
+        self.do_step(time, step)
+        return time + step
 
     @abstractmethod
     def value_function(self, verb: str, suffix: str) -> Any:

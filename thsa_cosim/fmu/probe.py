@@ -180,12 +180,8 @@ _KNOTS = (
 
 
 def excitable(description: FmuDescription) -> tuple[Variable, ...]:
-    """Inputs that can run linearly, and that need a signal."""
-    return tuple(
-        v
-        for v in description.inputs
-        if v.is_float and not v.is_array and v.variability == "continuous" and not v.may_stay_open
-    )
+    """Floating-point inputs that need a signal; discrete ones are held from one communication point to the next."""
+    return tuple(v for v in description.inputs if v.is_float and not v.is_array and not v.may_stay_open)
 
 
 def kinked_inputs(

@@ -238,6 +238,7 @@ LAG1 = """<?xml version="1.0" encoding="UTF-8"?>
  <ModelVariables>
   <ScalarVariable name="tau" valueReference="1" variability="parameter"><Real start="0.1"/></ScalarVariable>
   <ScalarVariable name="y" valueReference="2" causality="output"><Real/></ScalarVariable>
+  <ScalarVariable name="minus_y" valueReference="2" causality="output" alias="negatedAlias"><Real/></ScalarVariable>
   <ScalarVariable name="u" valueReference="3" causality="input"><Real start="0"/></ScalarVariable>
   <ScalarVariable name="steps" valueReference="1" causality="output" variability="discrete"><Integer/>
   </ScalarVariable>
@@ -258,6 +259,9 @@ EXCHANGE1 = """<?xml version="1.0" encoding="UTF-8"?>
   <ScalarVariable name="u" valueReference="2" causality="input"><Real start="0"/></ScalarVariable>
   <ScalarVariable name="at" valueReference="3" variability="parameter"><Real start="1e9"/></ScalarVariable>
   <ScalarVariable name="y" valueReference="4" causality="output"><Real/></ScalarVariable>
+  <ScalarVariable name="minus_y" valueReference="4" alias="negatedAlias"><Real/></ScalarVariable>
+  <ScalarVariable name="minus_k" valueReference="1" variability="parameter" alias="negatedAlias"><Real start="-1"/>
+  </ScalarVariable>
   <ScalarVariable name="h" valueReference="5" causality="output"><Real unit="m" displayUnit="mm"/></ScalarVariable>
   <ScalarVariable name="v" valueReference="6"><Real/></ScalarVariable>
   <ScalarVariable name="bounces" valueReference="0" causality="output" variability="discrete"><Integer/>

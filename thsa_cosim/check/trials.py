@@ -63,6 +63,7 @@ class Trials:
         self._halves = True
         self._budget = Budget()
         self._rests = False
+        self._slowness = ""
         self._changed = {
             name: value
             for name, value in probe.changed_parameters(description).items()
@@ -173,6 +174,7 @@ class Trials:
                 "it has no number among its outputs, states and local variables to watch",
             )
             return False
+        whole = self._time
         outcome, doubt = self._first_outcome()
         if not outcome.ok or outcome.signals is None:
             self._note("runs", Verdict.FAILED, f"{outcome.status}: {outcome.reason}")
@@ -184,24 +186,29 @@ class Trials:
         if (judged := numerics.judge_first_values(self._first)) is not None:
             self._take("first values", judged)
         does = numerics.moves(outcome.signals)
-        steps = len(self._time) - 1
+        reached = whole if self._slowness else self._time
+        steps, doubt = len(reached) - 1, doubt + self._slowness
         self._note(
             "runs",
             Verdict.OK if does and not doubt else Verdict.WARNING,
-            f"{self._kind}, {np.ptp(self._time):g} s in {steps} steps{self._whose_duration()}, {self._moved()}{doubt}"
+            f"{self._kind}, {np.ptp(reached):g} s in {steps} steps{self._whose_duration()}, {self._moved()}{doubt}"
             + ("" if does else "; no output moves, so what follows shows little"),
             duration_s=outcome.duration_s,
             steps=steps,
         )
         return True
 
+    @property
+    def _is_free(self) -> bool:
+        """Whether nobody said how long to simulate."""
+        return self._given.time is None and self._given.duration is None
+
     def _first_outcome(self) -> tuple[Outcome, str]:
         """The first run that succeeds, whole if possible, and what is to be said where it is not."""
         whole = self._time
         outcome = self._try()
         reason, doubt = outcome.reason, ""
-        free = self._given.time is None and self._given.duration is None
-        if outcome.status is Status.TIMEOUT and free:
+        if outcome.status is Status.TIMEOUT and self._is_free:
             outcome, doubt = self._cut_to_what_is_fast(outcome)
         elif not outcome.ok and self._may_be_cut():
             self._shorten(self._given.communication_points(self._description, cut=True))
@@ -272,6 +279,14 @@ class Trials:
     def _try(self) -> Outcome:
         """Run once; find out how inputs are to be given, and run so."""
         outcome = self._run_once()
+        if outcome.ok and outcome.duration_s > LONGEST_RUN and self._is_free:
+            seconds, points = np.ptp(self._time), len(self._time)
+            self._shorten(self._time[: int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))])
+            self._slowness = (
+                f"; it took {outcome.duration_s:.3g} s, so what follows is tried over"
+                f" {np.ptp(self._time):.3g} s of {seconds:g} s"
+            )
+            outcome = self._run_once()
         told = self._given.input_mode is not None or is_ours(self._description)
         if told or not outcome.ok or self._kind != "co-simulation":
             return outcome

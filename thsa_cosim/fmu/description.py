@@ -68,6 +68,8 @@ class Variable:
     element: tuple[int, int, int] | None = None
     """FMI 3, one element of an array: value reference, index and length of the array; ``value_reference`` is then a
     number of our own. The array itself has its entry, but is no input, output or parameter."""
+    is_negated: bool = False
+    """FMI 1: an alias of the other sign; the FMU sets and gets the variable that it stands for."""
     is_alias: bool = False
     """FMI 3: another name of a variable that has its own entry."""
 
@@ -208,7 +210,7 @@ def read_description(path: Path | str) -> FmuDescription:
         supports_co_simulation=co_simulation is not None,
         supports_model_exchange=model_exchange is not None,
         capabilities=_capabilities(model_exchange) | _capabilities(co_simulation) | _plural(xml),
-        variables=_variables(raw, intermediate),
+        variables=_negated(_variables(raw, intermediate), xml),
         default_experiment=DefaultExperiment()
         if experiment is None
         else DefaultExperiment(
@@ -310,6 +312,15 @@ def _variables(raw: Any, intermediate: set[int]) -> dict[str, Variable]:
             )
             virtual += 1
     return found
+
+
+def _negated(variables: dict[str, Variable], xml: bytes) -> dict[str, Variable]:
+    """Mark FMI 1.0's negated aliases, which fmpy does not read."""
+    if b"negatedAlias" not in xml:
+        return variables
+    elements = ElementTree.fromstring(xml).findall("ModelVariables/ScalarVariable")
+    names = {e.get("name") for e in elements if e.get("alias") == "negatedAlias"}
+    return {n: replace(v, is_negated=n in names) for n, v in variables.items()}
 
 
 def _shape(one: Any, raw: Any) -> tuple[int, ...] | None:

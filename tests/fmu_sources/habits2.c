@@ -5,7 +5,8 @@
  * ONCE: one instance per process, and never another. FIXED_STEP: steps of 0.01 s only. FIRST_VALUE=x: the output is
  * x before the first step. OTHER_START: the parameters start elsewhere than the model description says. PARTS: no step is
  * done further than 4 ms; what is left is for the next call. LICENCE=t: lost after so many seconds. JUMPS: y jumps by 1
- * after 0.2345 s. SLOW=t: each step takes so many microseconds. NAN_ABOVE=u: y is no number where the input is above u.
+ * after 0.2345 s. EULER: one explicit step per communication step. SLOW=t: each step takes so many microseconds.
+ * NAN_ABOVE=u: y is no number where the input is above u.
  */
 #include <math.h>
 #include <unistd.h>
@@ -113,7 +114,11 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
 #ifdef NAN_ABOVE
     if (m->u > NAN_ABOVE) m->y = NAN;
 #endif
+#ifdef EULER
+    m->y += (m->gain * m->u - m->y) * h / m->tau;
+#else
     m->y += (m->gain * m->u - m->y) * (1.0 - exp(-h / m->tau));
+#endif
     m->steps++;
 #ifdef PARTS
     if (!whole) return fmi2Discard;

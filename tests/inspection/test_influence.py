@@ -76,9 +76,7 @@ def test_spikes_that_move_nothing_are_not_worth_a_word() -> None:
 
 
 def test_a_stretch_that_asks_for_another_value_is_named() -> None:
-    found = only(
-        influences(*fitted(line("a", 3, lambda t, x: np.where((t > 1.5) & (t < 2.0), 0.97 * x, x))))
-    )
+    found = only(influences(*fitted(line("a", 3, lambda t, x: np.where((t > 1.5) & (t < 2.0), 0.97 * x, x)))))
     assert (found.channel, found.kind) == ("time", "disagreement")
     (span,) = found.where
     assert span == pytest.approx((1.5, 2.0), abs=0.01)

@@ -76,7 +76,9 @@ def _few_samples(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
     weights = np.where(far, _FAR / np.maximum(np.abs(fit.values), _FAR), 1.0)
     weighted = fit.slopes * weights[:, None]
     moved = fit.step(weighted.T @ fit.slopes, weighted.T @ fit.values)
-    moved = moved - fit.step(fit.normal, fit.slopes.T @ fit.values)  # what the search left undone is no influence
+    moved = moved - fit.step(
+        fit.normal, fit.slopes.T @ fit.values
+    )  # what the search left undone is no influence
     worst = int(np.argmax(np.abs(moved) / fit.stderr))
     if abs(moved[worst]) < _MOVED * fit.stderr[worst]:
         return
@@ -100,7 +102,9 @@ def _stretches(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
     whole = fit.variance(fit.normal)
     undone = fit.step(fit.normal, fit.slopes.T @ fit.values)
     with np.errstate(divide="ignore", invalid="ignore"):
-        inflation = np.maximum(fit.stderr**2 / whole, 1.0)  # by correlated noise, as the stated errors have it
+        inflation = np.maximum(
+            fit.stderr**2 / whole, 1.0
+        )  # by correlated noise, as the stated errors have it
     best: tuple[float, int, FloatArray, str, Span] | None = None
     for name in recordings:
         times = np.concatenate([np.where(r.recording == name, r.time, np.nan) for r in residuals])
@@ -121,8 +125,8 @@ def _stretches(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
         return
     _, k, moved, name, span = best
     text = (
-        f"what is from {span[0]:.4g} s to {span[1]:.4g} s does not agree with the rest: without it, {_change(fit, k, moved)};"
-        " a damage there, or something that the model lacks"
+        f"what is from {span[0]:.4g} s to {span[1]:.4g} s does not agree with the rest: without it,"
+        f" {_change(fit, k, moved)}; a damage there, or something that the model lacks"
     )
     yield Finding(name, "time", "disagreement", "warning", text, (span,))
 

@@ -83,7 +83,9 @@ def dead_band(channel: Channel) -> Iterator[Finding]:
         f"{channel.name} is 0 or more than {channel.number(width)}, never between ({share:.2g} % of its samples are 0):"
         " a dead band of its sensor or converter"
     )
-    remedy = f"[recordings.columns.{channel.name}]\nmissing = [0.0]  # a zero says no more than that it is small"
+    remedy = (
+        f"[recordings.columns.{channel.name}]\nmissing = [0.0]  # a zero says no more than that it is small"
+    )
     yield channel.finding("dead-band", "warning", text, (), remedy)
 
 

@@ -1,9 +1,10 @@
 """Which samples an identified value hangs on: a few that the model misses, or a stretch that asks for another value.
 
-Influence diagnostics of regression (Belsley, Kuh, Welsch, Regression Diagnostics, 1980) and Hausman's test (Econometrica
-46, 1978): a fit without some of the samples may differ from the fit to all of them by what chance allows. A damage that
-is short, or in one part of a recording, hardly shows in the misfit as a whole, and may still move a value by many of
-its standard errors. One step of Gauss and Newton per question, from the Jacobian that the fit has left; nothing is run.
+Influence diagnostics of regression (Belsley, Kuh, Welsch, Regression Diagnostics, 1980) and Hausman's test
+(Econometrica 46, 1978): a fit without some of the samples may differ from the fit to all of them by what chance
+allows. A damage that is short, or in one part of a recording, hardly shows in the misfit as a whole, and may still move
+a value by many of its standard errors. One step of Gauss and Newton per question, from the Jacobian that the fit has
+left; nothing is run.
 """
 
 from collections.abc import Iterator, Sequence
@@ -97,30 +98,26 @@ def _few_samples(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
 
 
 def _stretches(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
-    """A recording, or a part of one, without which the values would be others, by more than chance."""
+    """A recording, or up to half of one, without which the values would be others, by more than chance."""
     recordings = list(dict.fromkeys(r.recording for r in residuals))
-    whole = fit.variance(fit.normal)
-    undone = fit.step(fit.normal, fit.slopes.T @ fit.values)
+    whole, gradient = fit.variance(fit.normal), fit.slopes.T @ fit.values
+    undone = fit.step(fit.normal, gradient)
     with np.errstate(divide="ignore", invalid="ignore"):
         inflation = np.maximum(
             fit.stderr**2 / whole, 1.0
         )  # by correlated noise, as the stated errors have it
     best: tuple[float, int, FloatArray, str, Span] | None = None
     for name in recordings:
-        times = np.concatenate([np.where(r.recording == name, r.time, np.nan) for r in residuals])
-        ends = np.linspace(np.nanmin(times), np.nanmax(times), _PARTS + 1)
-        spans = [(float(a), float(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
-        for span in spans if len(recordings) == 1 else [*spans, (float(ends[0]), float(ends[-1]))]:
-            own = (times >= span[0]) & (times <= span[1])
-            slopes = fit.slopes[own]
-            normal = fit.normal - slopes.T @ slopes
-            moved = fit.step(normal, fit.slopes.T @ fit.values - slopes.T @ fit.values[own]) - undone
+        ends, normals, gradients = _by_parts(fit, residuals, name)
+        for first, last in _pieces(len(recordings) > 1):
+            normal = fit.normal - np.sum(normals[first:last], axis=0)
+            moved = fit.step(normal, gradient - np.sum(gradients[first:last], axis=0)) - undone
             chance = np.sqrt(inflation * np.maximum(fit.variance(normal) - whole, 1e-6 * whole))
             with np.errstate(invalid="ignore"):
                 sure = np.where(np.abs(moved) > _MOVED * fit.stderr, np.abs(moved) / chance, 0.0)
             k = int(np.argmax(np.nan_to_num(sure)))
             if sure[k] > _SURE and (best is None or sure[k] > best[0]):
-                best = (float(sure[k]), k, moved, name, span)
+                best = (float(sure[k]), k, moved, name, (float(ends[first]), float(ends[last])))
     if best is None:
         return
     _, k, moved, name, span = best
@@ -129,6 +126,29 @@ def _stretches(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
         f" {_change(fit, k, moved)}; a damage there, or something that the model lacks"
     )
     yield Finding(name, "time", "disagreement", "warning", text, (span,))
+
+
+def _by_parts(
+    fit: _Fit, residuals: Sequence[Residual], recording: str
+) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
+    """The ends (m + 1,) in s of m parts of a recording, and what each adds to the normal equations."""
+    time = np.concatenate([np.where(r.recording == recording, r.time, np.nan) for r in residuals])
+    ends = np.linspace(np.nanmin(time), np.nanmax(time), _PARTS + 1)
+    part = np.where(np.isnan(time), -1, np.minimum(np.searchsorted(ends, time, side="right") - 1, _PARTS - 1))
+    normals, gradients = [], []
+    for k in range(_PARTS):
+        slopes, values = fit.slopes[part == k], fit.values[part == k]
+        normals.append(slopes.T @ slopes)
+        gradients.append(slopes.T @ values)
+    return ends, normals, gradients
+
+
+def _pieces(several: bool) -> Iterator[tuple[int, int]]:
+    """Neighbouring parts [first, last) to leave out: up to half of a recording, or, of several, all of it."""
+    for first in range(_PARTS):
+        for last in range(first + 1, _PARTS + 1):
+            if last - first <= _PARTS // 2 or (several and last - first == _PARTS):
+                yield first, last
 
 
 def _change(fit: _Fit, k: int, moved: FloatArray) -> str:

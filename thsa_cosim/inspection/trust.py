@@ -104,10 +104,10 @@ def _channel(channel: str, own: Sequence[Residual]) -> list[str]:
         reasons.append(
             f"what is left of {channel} follows {name}, which accounts for {100 * share:.0f} % of it"
         )
-    depends = [found for r in own if (found := _depends(r)) > 0.0]
-    if depends and not follows:
+    levels = max((_depends(r) for r in own), default=0.0)
+    if levels > 0.0 and not follows:
         reasons.append(
-            f"what is left of {channel} depends on its own size, which accounts for {100 * max(depends):.0f} % of it: a"
+            f"what is left of {channel} depends on its own size, which accounts for {100 * levels:.0f} % of it: a"
             " sensor that is not linear, or a law that the model lacks"
         )
     return reasons

@@ -123,7 +123,7 @@ def _stretches(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
     _, k, moved, name, span = best
     text = (
         f"what is from {span[0]:.4g} s to {span[1]:.4g} s does not agree with the rest: without it,"
-        f" {_change(fit, k, moved)}; a damage there, or something that the model lacks"
+        f" {_change(fit, k, moved)}; a damage there, or a missing effect"
     )
     yield Finding(name, "time", "disagreement", "warning", text, (span,))
 

@@ -108,7 +108,7 @@ def _channel(channel: str, own: Sequence[Residual]) -> list[str]:
     if levels > 0.0 and not follows:
         reasons.append(
             f"what is left of {channel} depends on its own size, which accounts for {100 * levels:.0f} % of it: a"
-            " sensor that is not linear, or a law that the model lacks"
+            " sensor that is not linear, or a missing effect"
         )
     return reasons
 

@@ -15,7 +15,8 @@ from thsa_cosim.export.uniqueness import several_solutions
 from thsa_cosim.modelica.flat import Assertion, FlatEquation, FlatModel, FlatVariable
 from thsa_cosim.modelica.terms import Scalar, Term, make, plain, substitute, text, walk
 
-INFINITE = 1e100  # stands for Modelica.Constants.inf as a start value ("not yet"): sums with it have to stay finite
+INFINITE = 1e100
+"""Stands for Modelica.Constants.inf as a start value ("not yet"): sums with it have to stay finite."""
 
 
 @dataclass(frozen=True)

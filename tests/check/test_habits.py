@@ -78,6 +78,7 @@ def test_a_licence_that_is_lost_before_the_stop_time_fails(tmp_path: Path) -> No
     assert "the licence was lost; with its inputs at rest it fails, too" in found["runs"].text
 
 
+@pytest.mark.slow
 def test_a_duration_that_nobody_declared_is_said(tmp_path: Path) -> None:
     xml = HABITS2.replace("{flags}", "").replace('stopTime="1" ', "")
     path = write_fmu(tmp_path / "endless.fmu", xml, library("habits2.c"), "habits2")
@@ -105,6 +106,7 @@ def test_an_fmu_that_steps_by_itself_is_no_failure_and_told_no_shorter_step() ->
     assert found["inputs"].verdict is Verdict.NOT_TRIED
 
 
+@pytest.mark.slow
 def test_a_slow_fmu_is_tried_over_its_begin(monkeypatch: pytest.MonkeyPatch) -> None:
     """100 steps take 0.5 s at least, where a run may take 0.2 s, or is killed."""
     monkeypatch.setattr(bench, "LONGEST_RUN", 0.2)

@@ -55,6 +55,7 @@ class Bench:
         self._budget = Budget()
         self._rests = False
         self._slowness = ""
+        self._cut = False
         self._changed = {
             name: value
             for name, value in probe.changed_parameters(description).items()
@@ -190,6 +191,7 @@ class Bench:
                 break
             fast = int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))
             self._shorten(whole[:fast])
+            self._cut = True
             outcome = self._try()
             done = f"{np.ptp(self._time):.3g} s of {np.ptp(whole):g} s"
             return outcome, f"; only {done}: all of it takes more than {self._deadline:g} s (see --deadline)"
@@ -198,7 +200,7 @@ class Bench:
     def _try(self) -> Outcome:
         """Run once; find out how inputs are to be given, and run so."""
         outcome = self._run_once()
-        if outcome.ok and outcome.duration_s > LONGEST_RUN and self._is_free:
+        if outcome.ok and outcome.duration_s > LONGEST_RUN and self._is_free and not self._cut:
             seconds, points = np.ptp(self._time), len(self._time)
             self._shorten(self._time[: int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))])
             self._slowness = (

@@ -12,6 +12,7 @@ from thsa_cosim.check.budget import LONGEST_RUN, Budget
 from thsa_cosim.check.finding import Verdict
 from thsa_cosim.fmu import probe
 from thsa_cosim.fmu.inputs import input_modes, is_ours
+from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.system.description import SystemDescription
 
 _WARM_UP = 10
@@ -210,7 +211,9 @@ class Trials(Bench):
             self._take(name, self._declared_step(step, fixed))
             return
         if judged[0] is Verdict.FAILED:
-            judged = numerics.judge_shorter_steps(judged, [(step / 2, halved), *self._shorter_runs(step)])
+            judged = numerics.judge_shorter_steps(
+                judged, [(step / 2, halved), *self._shorter_runs(step, self._time, self._inputs)]
+            )
         self._take(name, judged)
         if len(self._time) > 2 and self._given.inputs is None:  # else the step is the user's
             change = judged[2].get("change", 0.0)
@@ -226,14 +229,20 @@ class Trials(Bench):
         if whole.signals is None:
             text = f"{coarse:g} s is too long, and its own {step:g} s fails: {whole.status}: {whole.reason}"
             return Verdict.FAILED, text, {}
-        verdict, text, values = numerics.judge_step(whole.signals, halved, step, fixed)
+        judged = numerics.judge_step(whole.signals, halved, step, fixed)
+        if judged[0] is Verdict.FAILED:
+            shorter = [(step / 2, halved), *self._shorter_runs(step, time, inputs)]
+            judged = numerics.judge_shorter_steps(judged, shorter)
+        verdict, text, values = judged
         text = f"{text}, over {np.ptp(time):g} s; {coarse:g} s, with which the stop time was reached, is too long"
         return verdict, text, values
 
-    def _shorter_runs(self, step: float) -> list[tuple[float, Outcome]]:
+    def _shorter_runs(
+        self, step: float, time: FloatArray, inputs: Signals | None
+    ) -> list[tuple[float, Outcome]]:
         """Runs with a quarter of the step and less, as far as they are affordable."""
         parts = [n for n in _PARTS if self._budget.run_s * n < LONGEST_RUN * 10]
-        finer = [self._experiment(f"h/{n}", refined(self._time, n)) for n in parts]
+        finer = [self._experiment(f"h/{n}", refined(time, n), inputs) for n in parts]
         if not finer:
             return []
         with self._runner(more=finer) as runner:

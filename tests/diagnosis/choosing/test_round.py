@@ -1,4 +1,4 @@
-"""The order of one round: screen, refine, further starts, choose, compare with forms and rivals; each part a stand-in."""
+"""The order of one round: screen, refine, further starts, choose, compare with forms and rivals."""
 
 from collections.abc import Sequence
 from types import SimpleNamespace

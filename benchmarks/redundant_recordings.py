@@ -2,10 +2,11 @@
 
     python benchmarks/redundant_recordings.py FOLDER [UNIT]...
 
-writes six recordings of each unit (default: all of `UNITS`) into a folder of its name: three to fit (lane A drives; lane A
-is switched off, so that lane B drives; the primary load path is disconnected on the bench, so that the secondary one
-carries), and three with other commands and loads to score. They are simulated at -30 degC with ``THSA.RedundantActuator``
-and the effects' Modelica classes in its slots. Four declared parameters of every unit are a few per cent off the drawing.
+writes six recordings of each unit (default: all of `UNITS`) into a folder of its name: three to fit (lane A drives;
+lane A is switched off, so that lane B drives; the primary load path is disconnected on the bench, so that the secondary
+one carries), and three with other commands and loads to score. They are simulated at -30 degC with
+``THSA.RedundantActuator`` and the effects' Modelica classes in its slots. Four declared parameters of every unit are a
+few per cent off the drawing.
 """
 
 import sys
@@ -62,7 +63,7 @@ SENSORS = {
     "voltage_B_V": ("u_B", 1.0, 0.3, 0.1),
     "force_secondary_kN": ("F_2", 1e-3, 0.06, 5e-3),
 }
-#: Settings of a recording, constants of its file: from when lane A is off and the primary path open, and the lock's force.
+#: Settings of a recording, constants of its file: from when lane A is off, the primary path open; the lock's force.
 CONSTANTS = {
     "lane_A_off_s": "laneA.t_loss",
     "primary_open_s": "primary.t_rupture",

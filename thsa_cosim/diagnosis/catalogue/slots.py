@@ -61,7 +61,7 @@ class Slot:
         return self.name + "Effect"
 
     def is_a(self, place: str) -> bool:
-        """Whether this is the ``place`` that an effect asks for, or one of several: ``motor``, ``motorA``, ``motor2``."""
+        """Whether this is the ``place`` of an effect, or one of several: ``motor``, ``motorA``, ``motor2``."""
         rest = self.name.removeprefix(place)
         return self.name.startswith(place) and (not rest or rest[0].isupper() or rest[0].isdigit())
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.known import known_effects
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round
 from thsa_cosim.diagnosis.choosing.orders import Machine, Order, name_by_order
@@ -12,7 +13,7 @@ from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown
-from thsa_cosim.diagnosis.results import FoundEffect, Judged, Value
+from thsa_cosim.diagnosis.results import FoundEffect, Judged, KnownEffect, Value
 from thsa_cosim.signals import FloatArray
 
 #: An error above this share of its value leaves it open; one above this share of the drawing's is the drawing's.
@@ -100,6 +101,18 @@ def found_effects(
             )
         )
     return tuple(effects)
+
+
+def known_values(known: Sequence[DeclaredEffect], fit: Fit, stderr: FloatArray) -> tuple[KnownEffect, ...]:
+    """The effects of the declared model with the values of ``fit``, whose unknowns err by ``stderr`` (n,)."""
+    values = values_of(fit, declared=True, stderr=stderr)
+    found: dict[str, dict[str, Value]] = {}
+    for effect in known:
+        for p in effect.candidate.parameters:
+            given = Value(effect.starts[p.name], p.unit, 0.0)
+            own = replace(values.get(p.variable, given), variable=p.variable, role=p.role)
+            found.setdefault(effect.candidate.name, {})[p.name] = own
+    return tuple(KnownEffect(name, parameters) for name, parameters in found.items())
 
 
 def order_of(scored: Scored, values: Mapping[str, Value], machine: Machine) -> Order | None:

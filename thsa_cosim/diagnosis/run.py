@@ -18,7 +18,13 @@ from thsa_cosim.diagnosis.catalogue.known import choose, known_effects
 from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
-from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, known_values, values_of
+from thsa_cosim.diagnosis.choosing.findings import (
+    found_effects,
+    judged,
+    known_values,
+    off_the_drawing,
+    values_of,
+)
 from thsa_cosim.diagnosis.choosing.orders import Machine, machine_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes, held_shapes
 from thsa_cosim.diagnosis.choosing.spread import between_models
@@ -191,6 +197,7 @@ class _Closing:
             if terms is not None and self.spec.empirical:
                 # The share stays that of the effects: a law describes and explains nothing.
                 model, extended, after = self._with_law(terms)
+        notes += off_the_drawing(after.fit)
         if model is not None and extended is not None:
             notes.append(
                 f"{extended.name} is for {native_platform().fmi3} only; thsa-cosim export {model}"

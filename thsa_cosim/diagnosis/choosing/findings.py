@@ -18,6 +18,8 @@ from thsa_cosim.signals import FloatArray
 
 #: An error above this share of its value leaves it open; one above this share of the drawing's is the drawing's.
 CLEAR, NO_MORE = 1.0 / 3.0, 0.95
+#: A declared parameter that is so many spreads from the drawing is a finding of its own: a brake that drags, a weak magnet.
+FAR = 5.0
 #: A machine of which no ratio is known.
 NO_MACHINE = Machine({}, {})
 #: What would not be seen at this many times its ordinary size cannot be tested.
@@ -46,6 +48,17 @@ def undetermined(unknown: Unknown, value: float, stderr: float) -> str:
     if unknown.declared and stderr > NO_MORE * unknown.spread:
         return "the recordings say no more of it than the drawing"
     return ""
+
+
+def off_the_drawing(fit: Fit) -> tuple[str, ...]:
+    """Which declared parameters the recordings move by more than `FAR` spreads from the drawing, the farthest first."""
+    apart = np.abs(fit.unknowns.prior(fit.vector))
+    far = [k for k in np.argsort(-apart) if apart[k] > FAR]
+    members = [(fit.unknowns.members[k], float(fit.vector[k]), float(apart[k])) for k in far]
+    return tuple(
+        f"{u.name}: {value:.4g} {u.unit} is {times:.0f} times its spread from the drawing's {u.start:.4g} {u.unit}"
+        for u, value, times in members
+    )
 
 
 def vague(members: Sequence[Scored], values: Mapping[str, Value]) -> dict[str, Value]:

@@ -18,7 +18,7 @@ from thsa_cosim.signals import FloatArray
 
 #: An error above this share of its value leaves it open; one above this share of the drawing's is the drawing's.
 CLEAR, NO_MORE = 1.0 / 3.0, 0.95
-#: A declared parameter that is so many spreads from the drawing is a finding of its own: a brake that drags, a weak magnet.
+#: A declared parameter so many spreads from the drawing is a finding of its own: a brake that drags, a weak magnet.
 FAR = 5.0
 #: A machine of which no ratio is known.
 NO_MACHINE = Machine({}, {})

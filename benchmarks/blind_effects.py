@@ -307,7 +307,11 @@ def spring(random: Random, rig: Rig) -> Draft:
     """A cable, a bellows or a seal that pulls the nut back to where it started, or pushes it away."""
     way = either_way(random)
     return Draft(
-        "spring", "linear", lambda a: {"spring": 1e5 * way * a}, 20.0, _signed("spring", "N/m", "stiffness", "c")
+        "spring",
+        "linear",
+        lambda a: {"spring": 1e5 * way * a},
+        20.0,
+        _signed("spring", "N/m", "stiffness", "c"),
     )
 
 

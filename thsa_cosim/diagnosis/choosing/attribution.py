@@ -12,6 +12,8 @@ from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
 from thsa_cosim.diagnosis.choosing.forms import best_form
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, SMALLEST_STRUCTURE, out_of_range
+from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine
+from thsa_cosim.diagnosis.choosing.ripples import freed, on_orders
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
 from thsa_cosim.diagnosis.choosing.selection import Say, Selection
@@ -86,9 +88,13 @@ def attribute(
     start: FloatArray | None = None,
     seed: int,
     most: int = 3,
+    machine: Machine = NO_MACHINE,
     say: Say = lambda _: None,
 ) -> Attribution | None:
-    """Find the effects, the declared parameters from ``start`` (default: the drawing); None if that does not run."""
+    """Find the effects, the declared parameters from ``start`` (default: the drawing); None if that does not run.
+
+    ``machine``: whose orders the ripples keep to.
+    """
     say("fitting the declared model")
     base = refine(bench, unknowns, unknowns.start if start is None else start, iterations=10)
     if base is None:
@@ -114,7 +120,13 @@ def attribute(
             left = [c for c in free if not _is_known(c, current)]
             rounds.append(
                 _round(
-                    selection, left, scan(current), seed + len(rounds), accepted, offered is candidates
+                    selection,
+                    left,
+                    scan(current),
+                    machine,
+                    seed + len(rounds),
+                    accepted,
+                    offered is candidates,
                 ).folded
             )
             if len(rounds) > 1:  # which effects are alike is told by the responses of the first
@@ -178,12 +190,15 @@ def _round(
     selection: Selection,
     offered: Sequence[Candidate],
     waves: Mapping[str, Sequence[float]],
+    machine: Machine,
     seed: int,
     accepted: Sequence[Scored],
     whole: bool,
 ) -> Round:
     """Screen what is ``offered`` (``whole``: all effects, else parts of the last one), refine the best, choose one."""
-    proposals = screen(selection.bench, selection.current, offered, waves)
+    proposals = on_orders(
+        screen(selection.bench, selection.current, offered, waves), machine, selection.current
+    )
     gains = largest_gains(selection.current, proposals, seed)
     limit = threshold(gains)
     scored = selection.refined(proposals, limit)
@@ -194,6 +209,10 @@ def _round(
         gains = largest_gains(selection.current, proposals, seed)
         limit = threshold(gains)
     choice, objections = selection.choose(scored, limit, not accepted, not whole)
+    if choice is not None and (free := freed(selection, choice)) is not None:
+        scored = [free if s.proposal is choice.proposal else s for s in scored]
+        proposals = [free.proposal if p is choice.proposal else p for p in proposals]
+        choice = free
     rivals: tuple[Scored, ...] = ()
     forms: tuple[Scored, ...] = ()
     if choice is not None and whole:

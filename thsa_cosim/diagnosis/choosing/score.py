@@ -48,7 +48,7 @@ def score(
     bench: Bench, current: Fit, held: FloatArray, proposal: Proposal, iterations: int = 2
 ) -> Scored | None:
     """Fit a proposal's parameters beside the current ones, whose Jacobian is kept, and score it; None if it fails."""
-    own = unknowns_of(proposal.candidate, proposal.shapes)
+    own = unknowns_of(proposal.candidate, proposal.shapes, proposal.held)
     unknowns = current.unknowns.with_members([u for u in own if u.name not in current.unknowns.names])
     members = unknowns.names
     new = [k for k in range(len(members)) if k >= len(current.unknowns.members)]
@@ -140,9 +140,20 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scor
     return _scored(bench, choice.proposal, best, current, held) or choice
 
 
+def with_all_free(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scored:
+    """The same from its optimum with the shapes fitted that it holds."""
+    proposal, fit = replace(choice.proposal, held=frozenset()), choice.fit
+    free = {u.name: u for u in unknowns_of(proposal.candidate, proposal.shapes)}
+    unknowns = Unknowns(
+        tuple(replace(u, spread=free[u.name].spread) if u.name in free else u for u in fit.unknowns.members)
+    )
+    found = refine(bench, unknowns, fit.vector, steps=fit.steps)
+    return choice if found is None else _scored(bench, proposal, found, current, held) or choice
+
+
 def extended_unknowns(declared: Unknowns, accepted: Sequence[Scored]) -> Unknowns:
     """The declared parameters and those of the accepted effects, the latter from their own starts."""
-    members = [u for s in accepted for u in unknowns_of(s.candidate, s.proposal.shapes)]
+    members = [u for s in accepted for u in unknowns_of(s.candidate, s.proposal.shapes, s.proposal.held)]
     return declared.with_members(list({u.name: u for u in members}.values()))
 
 

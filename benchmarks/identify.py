@@ -40,7 +40,7 @@ from thsa_cosim.identify import identify
 from thsa_cosim.identify.problem import build_point
 from thsa_cosim.laws import published_law
 from thsa_cosim.parameters import ParameterSpace
-from thsa_cosim.scenario import Executor, Scenario, load_scenario
+from thsa_cosim.scenario import Executor, Scenario, load
 from thsa_cosim.search import EvolutionSettings
 from thsa_cosim.search.differential_evolution import initial_population
 from thsa_cosim.study import Place, Progress
@@ -86,7 +86,7 @@ def moving(scenario: Scenario) -> np.ndarray:
 
 def scenario_of(recording: Path, *, linear: bool) -> Scenario:
     """The motor scenario: one recording, two channels, steady commands; its bounds linear on request."""
-    scenario = load_scenario(SCENARIO, fit=[recording])
+    scenario = load(SCENARIO, Scenario, fit=[recording])
     scenario = replace(
         scenario,
         search=scenario.search.model_copy(update={"method": "differential-evolution"}),

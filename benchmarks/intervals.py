@@ -26,7 +26,7 @@ from reference.rig import LAWS, Widths, rig_at
 from reference.waves import Wave
 
 from thsa_cosim.identify import identify
-from thsa_cosim.scenario import Executor, load_scenario
+from thsa_cosim.scenario import Executor, load
 from thsa_cosim.study import Place
 
 WIDTHS = Widths(motor=3e-3, gearbox=1e-4, nut=1e-7)
@@ -102,7 +102,7 @@ def run(
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"{bench}.parquet"
             measured(truth, temperature, (sorted(FOUND).index(bench), seed), correlation).to_parquet(path)
-            scenario = load_scenario(REPO / "scenarios" / f"{bench}.toml", fit=[path], seed=seed)
+            scenario = load(REPO / "scenarios" / f"{bench}.toml", fit=[path], seed=seed)
             # The polish ends in the same minimum from a shorter search.
             short = scenario.search.model_copy(update={"population": 12, "generations": 5})
             result = identify(

@@ -23,7 +23,7 @@ sys.path[:] = [entry for entry in sys.path if Path(entry or ".").resolve() != HE
 
 from scipy.optimize import differential_evolution
 
-from thsa_cosim.scenario import load_tune
+from thsa_cosim.scenario import load
 from thsa_cosim.signals import Signals
 from thsa_cosim.tune.combine import combine
 from thsa_cosim.tune.problem import build_groups
@@ -43,7 +43,7 @@ class Problem:
     """The cost of gains (n,) over all conditions of a tuning; keeps the best, and says when it is good enough."""
 
     def __init__(self, scenario_path, target):
-        self.scenario = load_tune(Path(scenario_path))
+        self.scenario = load(Path(scenario_path))
         self.group = build_groups(self.scenario)[0]
         self.names = Terms.of(self.scenario).names
         self.loop = Loop(str(self.scenario.fmu.path))

@@ -20,8 +20,7 @@ from thsa_cosim.batch import Experiment
 from thsa_cosim.errors import ThsaCosimError
 from thsa_cosim.fmu import Plant
 from thsa_cosim.fmu.fmi2 import Fmi2Instance
-from thsa_cosim.scenario import load_scenario
-from thsa_cosim.scenario.tune_load import load_tune
+from thsa_cosim.scenario import Scenario, TuneScenario, load
 from thsa_cosim.signals import Signals
 from thsa_cosim.simulate import _cases
 from thsa_cosim.tune.problem import build_groups
@@ -48,11 +47,11 @@ def experiments(kind: str, name: str) -> Iterator[tuple[Experiment, Mapping[str,
     """What a scenario simulates, with the noise of what it records."""
     path = SCENARIOS / f"{name}.toml"
     if kind == "tune":
-        for case in build_groups(load_tune(path))[0].cases:
+        for case in build_groups(load(path, TuneScenario))[0].cases:
             yield case.experiment, SIGMA
         return
     fit = {"fit": [EMPS]} if name == "emps" else {}
-    for recording, _, experiment in _cases(load_scenario(path, **fit)):
+    for recording, _, experiment in _cases(load(path, Scenario, **fit)):
         yield experiment, {**recording.noise, **SIGMA}
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from thsa_cosim.batch import Job, LocalRunner
 from thsa_cosim.costs import ResidualReducer
 from thsa_cosim.identify.problem import build_point
-from thsa_cosim.scenario import load_scenario
+from thsa_cosim.scenario import load
 from thsa_cosim.search import EvolutionSettings, PolishSettings, evolve, polish
 
 SETTINGS = {
@@ -45,7 +45,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
 
-    scenario = load_scenario(options.scenario)
+    scenario = load(options.scenario)
     window = scenario.cost.window.model_copy(update={"stop": options.seconds})
     scenario = replace(scenario, cost=scenario.cost.model_copy(update={"window": window}))
     points = [build_point(scenario, p) for p in scenario.points if p.temperature_degC in options.points]

@@ -153,10 +153,10 @@ def bare(name: str) -> float:
 
 def _experiments(name: str) -> Any:
     if COMMANDS[name] == "tune":
-        from thsa_cosim.scenario import load_tune
+        from thsa_cosim.scenario import load
         from thsa_cosim.tune.problem import build_groups
 
-        tuned = load_tune(SCENARIOS / f"{name}.toml")
+        tuned = load(SCENARIOS / f"{name}.toml")
         middle = tuned.parameters.assignments(tuned.before)
         yield tuned.fmu, [case.experiment for case in build_groups(tuned)[0].cases], middle
         return

@@ -10,7 +10,7 @@ from fmu.test_plant import lag
 from fmu_sources import build
 
 from thsa_cosim.errors import StudyError
-from thsa_cosim.scenario import Executor, load_scenario
+from thsa_cosim.scenario import Executor, load
 from thsa_cosim.simulate import simulate
 from thsa_cosim.study import Place
 
@@ -55,7 +55,7 @@ def test_every_recording_is_simulated_and_compared(scenario_file: Path, tmp_path
     told: list[str] = []
     folder = tmp_path / "study"
     place = Place(folder, Executor(2), lambda progress: told.append(progress.stage))
-    result = simulate(load_scenario(scenario_file), place)
+    result = simulate(load(scenario_file), place)
     assert told == ["1 of 2 recordings simulated", "2 of 2 recordings simulated"]
     first, second = result.recordings
     assert (first.role, second.role) == ("fit", "validate")
@@ -75,7 +75,7 @@ def test_every_recording_is_simulated_and_compared(scenario_file: Path, tmp_path
 
 def test_communication_step_of_the_scenario(scenario_file: Path, tmp_path: Path) -> None:
     scenario_file.write_text(scenario_file.read_text() + "\nstep = 0.01\n")
-    result = simulate(load_scenario(scenario_file), Place(tmp_path / "study"))
+    result = simulate(load(scenario_file), Place(tmp_path / "study"))
     simulated = result.recordings[0].simulated
     assert simulated is not None
     assert simulated.time.size == 101
@@ -87,13 +87,13 @@ def test_failures_are_part_of_the_result_unless_all_fail(scenario_file: Path, tm
     scenario_file.write_text(good.replace("tau = 0.1", f"tau = 0.1\nfault = {build.FAULTS['nan']}\nat = 0.9"))
     short = pd.read_csv(tmp_path / "first.csv").iloc[:150]
     short.to_csv(tmp_path / "first.csv", index=False)
-    result = simulate(load_scenario(scenario_file), Place(tmp_path / "study"))
+    result = simulate(load(scenario_file), Place(tmp_path / "study"))
     assert [r.status for r in result.recordings] == ["ok", "not-finite"]
     assert list(result.failures.values()) == [1]
     assert result.recordings[1].errors == {}
     scenario_file.write_text(good.replace("tau = 0.1", f"tau = 0.1\nfault = {build.FAULTS['error']}\nat = 0"))
     with pytest.raises(StudyError, match="All 2 simulations failed, 2 of them because fmi2DoStep returned"):
-        simulate(load_scenario(scenario_file), Place(tmp_path / "other"))
+        simulate(load(scenario_file), Place(tmp_path / "other"))
 
 
 def test_a_signal_that_comes_late_is_named_and_what_fits_has_no_finding(
@@ -103,7 +103,7 @@ def test_a_signal_that_comes_late_is_named_and_what_fits_has_no_finding(
     table["speed"] = table["speed"].shift(4).bfill()
     table.to_csv(tmp_path / "late.csv", index=False)
     files = [str(tmp_path / "first.csv"), str(tmp_path / "late.csv")]
-    result = simulate(load_scenario(scenario_file, fit=files, validate=[]), Place(tmp_path / "study"))
+    result = simulate(load(scenario_file, fit=files, validate=[]), Place(tmp_path / "study"))
     slips = [f for f in result.data.findings if f.kind == "delay"]
     assert [(f.recording, f.channel) for f in slips] == [("late", "y")]
     assert float(slips[0].remedy.rpartition("= ")[2]) == pytest.approx(-0.02, rel=0.1)

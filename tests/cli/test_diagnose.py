@@ -15,7 +15,7 @@ from thsa_cosim.api.conduct import ask
 from thsa_cosim.cli.options import StudyOptions
 from thsa_cosim.export import export_fmu
 from thsa_cosim.fmu import Plant
-from thsa_cosim.scenario import Scenario, load_scenario
+from thsa_cosim.scenario import Scenario, load
 from thsa_cosim.study import claim_folder, study_identity
 
 ROOT = Path(__file__).parents[2]
@@ -96,7 +96,7 @@ def test_a_finished_folder_does_not_answer_another_question(
     asked = '[diagnose]\neffects = ["windage", "stribeck"]\nmost = 2\nspread = 0.05\nempirical = true\n'
     study = tmp_path / "study"
     first = scenario(tmp_path, 2000, **{"[diagnose]\n": asked, "spread = 0.1": ""})
-    claim_folder(study, study_identity(load_scenario(first)))
+    claim_folder(study, study_identity(load(first)))
     (study / "result.json").write_text('{"kind": "diagnose", "status": "complete"}', encoding="utf-8")
     first.write_text(first.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
     assert cli.run_command(["diagnose", str(first), "-o", str(study)]) == 2

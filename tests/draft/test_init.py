@@ -16,7 +16,7 @@ from thsa_cosim.errors import ParameterError
 from thsa_cosim.fmu import FmuDescription, Variable, read_description
 from thsa_cosim.fmu.description import DefaultExperiment
 from thsa_cosim.recordings.columns import FoundColumn, words
-from thsa_cosim.scenario import load_scenario
+from thsa_cosim.scenario import load
 
 ROOT = Path(__file__).parents[2]
 SCENARIOS = ROOT / "scenarios"
@@ -174,7 +174,7 @@ def test_what_fits_nowhere_is_listed_and_the_rest_still_loads(small: FmuDescript
     ):
         assert comment in draft.text
     target.write_text(draft.text)
-    assert load_scenario(target).inputs == ("w_cmd", "T_amb")
+    assert load(target).inputs == ("w_cmd", "T_amb")
 
 
 def test_a_unit_with_a_slash_is_the_unit_and_the_name_before_it_is_the_variable(
@@ -191,7 +191,7 @@ def test_a_unit_with_a_slash_is_the_unit_and_the_name_before_it_is_the_variable(
     left = {c.name: c.unit for c in draft.unmatched_columns}
     assert columns.get("w_m", {}).get("column") == "J1_w [rad/s]" or left == {"J1_w [rad/s]": "rad/s"}
     target.write_text(draft.text)
-    assert "w_cmd" in load_scenario(target).inputs
+    assert "w_cmd" in load(target).inputs
 
 
 def test_units_of_the_file_count_and_missing_ones_are_assumed(small: FmuDescription, tmp_path: Path) -> None:
@@ -206,7 +206,7 @@ def test_units_of_the_file_count_and_missing_ones_are_assumed(small: FmuDescript
     }
     assert "assumed: the FMU's" in draft.text
     (tmp_path / "scenario.toml").write_text(draft.text)
-    recording = load_scenario(tmp_path / "scenario.toml").fit[0]
+    recording = load(tmp_path / "scenario.toml").fit[0]
     assert recording.signals.units["w_m"] == "rad/s"
 
 

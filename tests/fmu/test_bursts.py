@@ -6,7 +6,7 @@ import pytest
 from courses import noted_courses
 
 from thsa_cosim.fmu import Plant
-from thsa_cosim.scenario import load_scenario
+from thsa_cosim.scenario import load
 from thsa_cosim.simulate import _cases
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "driven_check.toml"
@@ -14,7 +14,7 @@ SCENARIO = Path(__file__).parents[2] / "scenarios" / "driven_check.toml"
 
 def test_grazing_events_of_the_driven_check_do_not_leave_blind_steps_behind(monkeypatch):
     runs = noted_courses(monkeypatch)
-    for recording, _, experiment in _cases(load_scenario(SCENARIO)):
+    for recording, _, experiment in _cases(load(SCENARIO)):
         with Plant.open(experiment.fmu, stepping="free") as plant:
             plant.run(
                 experiment.fixed,

@@ -13,7 +13,7 @@ from scipy.io import savemat
 from thsa_cosim.errors import ScenarioError
 from thsa_cosim.fmu import Plant
 from thsa_cosim.identify import force_balance
-from thsa_cosim.scenario import ForceSpec, load_scenario
+from thsa_cosim.scenario import ForceSpec, load
 from thsa_cosim.signals import Signals
 from thsa_cosim.study import Comparison
 
@@ -143,7 +143,7 @@ def test_what_the_force_residual_needs_is_checked(
     record: Path, tmp_path: Path, old: str, new: str, sentence: str
 ) -> None:
     with pytest.raises(ScenarioError) as caught:
-        load_scenario(shortened(tmp_path, old=old, new=new), fit=[record])
+        load(shortened(tmp_path, old=old, new=new), fit=[record])
     assert sentence in str(caught.value)
 
 
@@ -151,4 +151,4 @@ def test_the_shipped_scenario_asks_for_the_record() -> None:
     with pytest.raises(
         ScenarioError, match=r"recordings\.fit names no recording; add one, or give it with --fit"
     ):
-        load_scenario(EMPS)
+        load(EMPS)

@@ -9,7 +9,7 @@ import pytest
 
 from thsa_cosim.diagnosis.results import Value
 from thsa_cosim.report.diagnose.extended import write_extended_scenario
-from thsa_cosim.scenario import load_scenario
+from thsa_cosim.scenario import load
 from thsa_cosim.scenario.source import read_toml
 
 ROOT = Path(__file__).parents[2]
@@ -51,7 +51,7 @@ def test_it_can_be_loaded_with_the_found_values_as_starts(tmp_path: Path) -> Non
     assert starts["load-dependent-friction:gear.mu"] == 0.4
     assert content["fixed"]["m"] == 0.2, "shapes keep the value that was found"
     path.write_text(path.read_text().replace('"Servo.fmu"', f'"{ROOT / "fmus" / "Servo.fmu"}"'))
-    found = load_scenario(path)
+    found = load(path)
     assert [r.name for r in found.fit][:2] == ["servo_kp100_lift_and_drop", "servo_kp100_sin_sin"]
     assert found.parameters.names[-1] == "load-dependent-friction:gear.mu"
     coefficient = found.parameters.parameters[-1]

@@ -12,7 +12,7 @@ from reference.waves import Wave
 import thsa_cosim as tc
 from thsa_cosim.errors import ScenarioError
 from thsa_cosim.laws import published_law
-from thsa_cosim.scenario import load_scenario
+from thsa_cosim.scenario import load
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 WIDTHS = Widths(motor=3e-3, gearbox=1e-4, nut=1e-7)
@@ -54,7 +54,7 @@ def test_the_motor_of_the_recording_is_that_of_the_rig() -> None:
 
 
 def test_the_recording_lasts_20_minutes_and_warms_up() -> None:
-    scenario = load_scenario(SCENARIOS / "warm_up_screw.toml")
+    scenario = load(SCENARIOS / "warm_up_screw.toml")
     (recording,) = scenario.fit
     assert recording.signals.time[-1] - recording.signals.time[0] <= 1200.0
     off = recording.signals["T_amb"] - warm_up.temperature("screw", recording.signals.time)
@@ -82,4 +82,4 @@ def test_what_cannot_be_searched_as_a_law_is_refused(
     file = tmp_path / "own.toml"
     file.write_text(text.replace('"../fmus/', f'"{SCENARIOS.parent}/fmus/'))
     with pytest.raises(ScenarioError, match=said):
-        load_scenario(file)
+        load(file)

@@ -9,7 +9,7 @@ from small_scenario import toml, valid, write_folder
 from thsa_cosim.errors import RecordingError, ScenarioError
 from thsa_cosim.fmu import Plant
 from thsa_cosim.identify.problem import build_point
-from thsa_cosim.scenario import Scenario, load_scenario
+from thsa_cosim.scenario import Scenario, load
 from thsa_cosim.signals import Signals
 from thsa_cosim.simulate import simulate
 from thsa_cosim.study import Place
@@ -35,7 +35,7 @@ def cut(folder, parts, lead_in=0.0, **options) -> Scenario:
     data["recordings"]["time"]["lead_in"] = lead_in
     file = folder / "cut.toml"
     file.write_text(toml(data))
-    return load_scenario(file, **options)
+    return load(file, **options)
 
 
 def test_a_file_is_cut_into_a_part_to_fit_and_a_part_to_score(folder):
@@ -102,7 +102,7 @@ def test_cuts_are_made_in_one_place(folder):
     data["recordings"]["time"]["start"] = 0.1
     (folder / "twice.toml").write_text(toml(data))
     with pytest.raises(ScenarioError, match=r"time\.start and time\.stop cut whole files"):
-        load_scenario(folder / "twice.toml")
+        load(folder / "twice.toml")
 
 
 def test_a_lead_in_that_leaves_nothing_is_refused(folder):
@@ -135,7 +135,7 @@ def test_a_drive_that_is_cut_in_motion_needs_its_lead_in(tmp_path):
             },
         }
         (tmp_path / "later.toml").write_text(toml(data))
-        result = simulate(load_scenario(tmp_path / "later.toml"), Place(tmp_path / f"study_{lead_in}"))
+        result = simulate(load(tmp_path / "later.toml"), Place(tmp_path / f"study_{lead_in}"))
         return result.recordings[0].errors["F"].rmse
 
     assert error(0.0) > 5.0  # N

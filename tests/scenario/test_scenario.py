@@ -22,7 +22,7 @@ from thsa_cosim.errors import (
     UnitError,
 )
 from thsa_cosim.fmu import read_description
-from thsa_cosim.scenario import KINDS, Scenario, load_scenario
+from thsa_cosim.scenario import KINDS, Scenario, load
 from thsa_cosim.ssv import ParameterSet, write_ssv
 
 ROOT = Path(__file__).parents[2]
@@ -35,15 +35,15 @@ def folder(tmp_path_factory):
     return path
 
 
-def load(folder, data, **options):
+def loaded(folder, data, **options):
     file = folder / "small.toml"
     file.write_text(toml(data))
-    return load_scenario(file, **options)
+    return load(file, Scenario, **options)
 
 
 def sentence(folder, data, error=ThsaCosimError, **options):
     with pytest.raises(error) as caught:
-        load(folder, data, **options)
+        loaded(folder, data, **options)
     message = str(caught.value)
     assert str(folder) in message
     assert "\n" not in message
@@ -61,7 +61,7 @@ def test_a_temperature_that_starts_below_absolute_zero_needs_no_column() -> None
 
 
 def test_a_valid_scenario_in_full(folder):
-    scenario = load(folder, valid())
+    scenario = loaded(folder, valid())
     assert (scenario.kind, scenario.title, scenario.seed) == ("identify", "small", 3)
     assert scenario.inputs == ("w_cmd", "T_amb")
     assert scenario.measured == scenario.outputs == ("w_m", "i_q")
@@ -88,20 +88,20 @@ def test_a_valid_scenario_in_full(folder):
 
 
 def test_recordings_are_grouped_by_rounded_temperature_coldest_first(folder):
-    scenario = load(folder, valid())
+    scenario = loaded(folder, valid())
     assert [p.temperature_degC for p in scenario.points] == [-30.0, 25.0]
     cold, warm = scenario.points
     assert ([r.name for r in cold.fit], [r.name for r in cold.validate]) == (["cold_1", "cold_2"], ["check"])
     assert ([r.name for r in warm.fit], warm.validate) == (["warm"], ())
     assert cold.label == "-30 degC"
-    joint = load(folder, set_in(valid(), "temperature/group", "joint"))
+    joint = loaded(folder, set_in(valid(), "temperature/group", "joint"))
     assert [(p.temperature_degC, len(p.fit)) for p in joint.points] == [(None, 3)]
-    without = load(folder, set_in(valid(), "temperature", ...))
+    without = loaded(folder, set_in(valid(), "temperature", ...))
     assert [(p.temperature_degC, len(p.fit), len(p.validate)) for p in without.points] == [(None, 3, 1)]
 
 
 def test_inputs_measured_values_and_noise(folder):
-    scenario = load(folder, valid())
+    scenario = loaded(folder, valid())
     run = scenario.fit[0]
     drive = scenario.drive(run)
     assert drive.names == ("w_cmd", "T_amb")
@@ -115,13 +115,13 @@ def test_law_coefficients_can_be_parameters(folder):
     data = set_in(valid(), "temperature/group", "joint")
     more = {"name": "R_s1", "variable": "motor.R_s.a1", "unit": "Ohm/K", "lower": -1.0, "upper": 1.0}
     data["parameters"].append(more)
-    scenario = load(folder, data)
+    scenario = loaded(folder, data)
     assert scenario.fixed == {"velocityController.K_p": 0.12, "motor.R_s.a2": 0.0}
     assert scenario.points[0].space.names == ("R_s", "J", "R_s1")
 
 
 def test_parameters_per_recording(folder):
-    scenario = load(folder, set_in(valid(), "parameters/1/per", "recording"))
+    scenario = loaded(folder, set_in(valid(), "parameters/1/per", "recording"))
     assert scenario.parameters.names == ("R_s", "J")
     assert scenario.points[0].space.names == ("R_s", "J[cold_1]", "J[cold_2]")
     assert scenario.points[1].space.names == ("R_s", "J[warm]")
@@ -129,11 +129,11 @@ def test_parameters_per_recording(folder):
 
 def test_zero_by_glob_and_fixed_wins_over_a_law_block(folder):
     data = set_in(valid(), "parameters/0/law_block", ...)
-    scenario = load(folder, set_in(data, "parameters/0/zero", ["motor.R_s.a?"]))
+    scenario = loaded(folder, set_in(data, "parameters/0/zero", ["motor.R_s.a?"]))
     assert scenario.fixed["motor.R_s.a1"] == scenario.fixed["motor.R_s.a2"] == 0.0
     assert "motor.R_s.a0" not in scenario.fixed
     data = set_in(valid(), "fixed/motor.R_s.a1", 0.5)
-    assert load(folder, data).fixed["motor.R_s.a1"] == 0.5
+    assert loaded(folder, data).fixed["motor.R_s.a1"] == 0.5
 
 
 def test_parameter_set_gives_start_values_in_its_own_units(folder):
@@ -144,7 +144,7 @@ def test_parameter_set_gives_start_values_in_its_own_units(folder):
         ),
     )
     data = set_in(set_in(valid(), "parameter_set", "set.ssv"), "parameters/1", ...)
-    scenario = load(folder, data)
+    scenario = loaded(folder, data)
     assert scenario.fixed["motor.J"] == pytest.approx(3e-3)
     assert scenario.fixed["velocityController.K_p"] == 0.12
     assert scenario.fixed["motor.gain"] == 2.0
@@ -158,7 +158,7 @@ def test_parameter_set_gives_start_values_in_its_own_units(folder):
 
 
 def test_given_start_values_of_an_earlier_stage(folder):
-    scenario = load(folder, valid()).given({-30.0: {"motor.gain": 2.0, "motor.J": 1.0}})
+    scenario = loaded(folder, valid()).given({-30.0: {"motor.gain": 2.0, "motor.J": 1.0}})
     assert scenario.points[0].fixed["motor.gain"] == 2.0
     assert "motor.J" not in scenario.points[0].fixed
     assert "motor.gain" not in scenario.points[1].fixed
@@ -173,12 +173,12 @@ def simulate():
 
 def test_simulate_needs_no_parameters_and_records_every_output(folder):
     data = simulate()
-    scenario = load(folder, set_in(data, "recordings/columns/i_q", ...) | {"cost": {}})
+    scenario = loaded(folder, set_in(data, "recordings/columns/i_q", ...) | {"cost": {}})
     assert scenario.kind == "simulate"
     assert scenario.measured == ("w_m",)
     assert scenario.outputs == ("w_m", "i_q")
     assert scenario.parameters.dimension == 0
-    only = load(
+    only = loaded(
         folder,
         simulate() | {"outputs": ["flux"], "recordings": {**data["recordings"], "fit": []}, "cost": {}},
     )
@@ -188,7 +188,7 @@ def test_simulate_needs_no_parameters_and_records_every_output(folder):
 
 def test_command_line_recordings_replace_the_scenario_s(folder, monkeypatch):
     monkeypatch.chdir(folder / "runs")
-    scenario = load(folder, valid(), fit=["cold_1.csv"], validate=["w*.csv"], seed=9)
+    scenario = loaded(folder, valid(), fit=["cold_1.csv"], validate=["w*.csv"], seed=9)
     assert [r.name for r in scenario.fit] == ["cold_1"]
     assert [r.name for r in scenario.validate] == ["warm"]
     assert scenario.seed == 9
@@ -200,13 +200,13 @@ def test_names_stay_apart_when_files_share_theirs(folder, tmp_path):
     for part in ("unit_a", "unit_b"):
         (tmp_path / part).mkdir()
         write_recording(tmp_path / part / "fit_1.csv", -30)
-    scenario = load(folder, valid(), fit=sorted(tmp_path.glob("*/fit_1.csv")))
+    scenario = loaded(folder, valid(), fit=sorted(tmp_path.glob("*/fit_1.csv")))
     assert [r.name for r in scenario.fit] == ["unit_a/fit_1", "unit_b/fit_1"]
 
 
 def test_the_same_recording_is_read_once_and_never_both_fit_and_validate(folder):
     data = set_in(valid(), "recordings/fit", ["runs/warm.csv", "runs/w*.csv", "./runs/../runs/warm.csv"])
-    assert len(load(folder, data).fit) == 1
+    assert len(loaded(folder, data).fit) == 1
     data = set_in(valid(), "recordings/validate", ["runs/warm.csv"])
     assert "both a fit and a validate recording" in sentence(folder, data, ScenarioError)
 
@@ -214,9 +214,9 @@ def test_the_same_recording_is_read_once_and_never_both_fit_and_validate(folder)
 def test_fmu_can_be_replaced(folder, tmp_path):
     shutil.copy(folder / "Small.fmu", tmp_path / "Other.fmu")
     data = set_in(valid(), "fmu", "none.fmu")
-    assert load(folder, data, fmu=tmp_path / "Other.fmu").fmu.path.name == "Other.fmu"
-    described = load(folder, valid()).fmu
-    assert load(folder, data, fmu=described).fmu is described
+    assert loaded(folder, data, fmu=tmp_path / "Other.fmu").fmu.path.name == "Other.fmu"
+    described = loaded(folder, valid()).fmu
+    assert loaded(folder, data, fmu=described).fmu is described
     assert "none.fmu" in sentence(folder, data, InputError)
     (folder / "bad.fmu").write_bytes(b"no archive")
     assert "bad.fmu" in sentence(folder, set_in(valid(), "fmu", "bad.fmu"), InputError)
@@ -369,13 +369,13 @@ def test_wrong_files_units_and_bounds_are_one_sentence(folder, key, value, error
 
 def test_a_channel_without_noise_asks_for_a_number(folder):
     data = set_in(valid(), "recordings/columns/i_q/smooth", "mean")
-    assert load(folder, data)  # the noise is that of the file, not of its mean
+    assert loaded(folder, data)  # the noise is that of the file, not of its mean
     rows = (folder / "runs" / "warm.csv").read_text().splitlines()
     flat = [",".join((*row.split(",")[:3], "1.0", row.split(",")[4])) for row in rows[1:]]
     (folder / "runs" / "flat.csv").write_text("\n".join((rows[0], *flat)))
     data = set_in(valid(), "recordings/fit", ["runs/flat.csv"])
     assert "no noise can be seen on 'i_q'" in sentence(folder, data, ScenarioError)
-    assert load(folder, set_in(data, "cost/channels/i_q/noise", 0.05))
+    assert loaded(folder, set_in(data, "cost/channels/i_q/noise", 0.05))
 
 
 @pytest.mark.parametrize(
@@ -393,7 +393,7 @@ def test_what_is_no_scenario_file(tmp_path, content, what):
     file = tmp_path / "x.toml"
     file.write_bytes(content)
     with pytest.raises(ScenarioError, match=r"x\.toml: ") as caught:
-        load_scenario(file)
+        load(file)
     assert what in str(caught.value)
 
 
@@ -402,11 +402,11 @@ def test_missing_scenario_file_and_folder(folder):
     with pytest.raises(
         ScenarioError, match=r"no such scenario file; check the path\. Did you mean 'small\.toml'"
     ):
-        load_scenario(folder / "smal.toml")
+        load(folder / "smal.toml")
     with pytest.raises(ScenarioError, match="cannot be read"):
-        load_scenario(folder)
+        load(folder)
     with pytest.raises(ScenarioError, match="cannot be read"):
-        load_scenario("nul\0.toml")
+        load("nul\0.toml")
 
 
 def test_every_kind_has_its_table():
@@ -492,7 +492,7 @@ RELAXED = settings(max_examples=400, deadline=None, suppress_health_check=[Healt
 def outcome(file):
     """Return the message of an input error, "" for a scenario; anything else is a failure."""
     try:
-        assert isinstance(load_scenario(file), Scenario)
+        assert isinstance(load(file), Scenario)
     except ThsaCosimError as error:
         return str(error)
     return ""
@@ -522,7 +522,7 @@ def test_damaged_text_is_a_scenario_or_one_sentence(folder, data):
 
 @pytest.mark.skipif(not (ROOT / "fmus" / "Motor.fmu").exists(), reason="needs fmus/Motor.fmu")
 def test_the_shipped_motor_scenario():
-    scenario = load_scenario(ROOT / "scenarios" / "motor.toml")
+    scenario = load(ROOT / "scenarios" / "motor.toml")
     assert [p.temperature_degC for p in scenario.points] == [-55, -50, -40, -30, -20, -10, 0, 25]
     assert scenario.parameters.names == ("R_s", "psi_pm", "T_fm", "b_m")
     assert (scenario.search.population, scenario.search.generations) == (45, 30)

@@ -17,7 +17,7 @@ from small_scenario import toml, valid, write_folder
 from thsa_cosim.diagnosis.catalogue.known import choose, known_effects
 from thsa_cosim.errors import InputError
 from thsa_cosim.export.flatten import locate
-from thsa_cosim.scenario import load as load_any
+from thsa_cosim.scenario import load
 from thsa_cosim.units import is_unit, same_dimension
 
 ROOT = Path(__file__).parents[2]
@@ -159,8 +159,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def load(path: Path, kind: str) -> object:
-    scenario = load_any(path)
+def loaded(path: Path, kind: str) -> object:
+    scenario = load(path)
     spec = getattr(scenario, "diagnose", None)
     if spec is not None:  # what the diagnosis itself looks up, before it runs anything
         choose(known_effects(spec.catalogue), spec.effects, "diagnose.effects")
@@ -205,7 +205,7 @@ def test_every_section_is_misspelt() -> None:
 def test_the_right_spelling_loads(folder: Path, kind: str) -> None:
     path = folder / f"{kind}.toml"
     path.write_text(toml(KINDS[kind]))
-    assert load(path, kind)
+    assert loaded(path, kind)
 
 
 @pytest.mark.parametrize(
@@ -220,7 +220,7 @@ def test_a_misspelling_gets_the_right_spelling(
     file = folder / "misspelt.toml"
     file.write_text(toml(data))
     with pytest.raises(InputError) as caught:
-        load(file, kind)
+        loaded(file, kind)
     message = str(caught.value)
     assert "\n" not in message
     meant = re.search(r"Did you mean '([^']*)'\?", message)

@@ -4,8 +4,7 @@ import pytest
 from small_scenario import set_in, toml, valid, write_folder
 
 from thsa_cosim.errors import RecordingError, ScenarioError, ThsaCosimError
-from thsa_cosim.scenario import Scenario, StagedScenario, hand_on
-from thsa_cosim.scenario import load as load_any
+from thsa_cosim.scenario import Scenario, StagedScenario, hand_on, load
 
 
 @pytest.fixture(scope="module")
@@ -34,13 +33,13 @@ STAGES = {
 }
 
 
-def load(folder, data, **options):
+def loaded(folder, data, **options):
     (folder / "all.toml").write_text(toml(data))
-    return load_any(folder / "all.toml", **options)
+    return load(folder / "all.toml", **options)
 
 
 def test_stages_are_read_in_order_and_share_the_seed(folder):
-    study = load(folder, STAGES)
+    study = loaded(folder, STAGES)
     assert isinstance(study, StagedScenario)
     assert [(s.name, s.give) for s in study.stages] == [
         ("first", ("R_s",)),
@@ -48,12 +47,12 @@ def test_stages_are_read_in_order_and_share_the_seed(folder):
         ("last", ()),
     ]
     assert {s.scenario.seed for s in study.stages} == {5}
-    assert {s.scenario.seed for s in load(folder, STAGES, seed=8).stages} == {8}
-    assert isinstance(load_any(folder / "first.toml"), Scenario)
+    assert {s.scenario.seed for s in loaded(folder, STAGES, seed=8).stages} == {8}
+    assert isinstance(load(folder / "first.toml"), Scenario)
 
 
 def test_what_a_stage_found_is_handed_on_in_the_units_of_the_next_fmu(folder):
-    first, second, last = load(folder, STAGES).stages
+    first, second, last = loaded(folder, STAGES).stages
     found = {-30.0: {"R_s": 0.5, "J": 1.5}, 25.0: {"R_s": 1.9, "J": 1.5}}
     later = hand_on(first, lambda t: found[t], second.scenario)
     for point, resistance in zip(later.points, (0.5, 1.9), strict=True):
@@ -68,7 +67,7 @@ def test_what_a_stage_found_is_handed_on_in_the_units_of_the_next_fmu(folder):
 
 
 def test_a_variable_that_is_searched_again_is_not_overwritten(folder):
-    first = load(folder, STAGES).stages[0]
+    first = loaded(folder, STAGES).stages[0]
     assert (
         hand_on(first, lambda t: {"R_s": 0.5, "J": 1.0}, first.scenario).points[0].fixed
         == first.scenario.fixed
@@ -99,7 +98,7 @@ def test_a_variable_that_is_searched_again_is_not_overwritten(folder):
 def test_wrong_stages_are_one_sentence(folder, key, value, error, what):
     data = {**STAGES, "stages": [dict(stage) for stage in STAGES["stages"]]}
     with pytest.raises(error) as caught:
-        load(folder, set_in(data, key, value))
+        loaded(folder, set_in(data, key, value))
     message = str(caught.value)
     assert message.startswith(f"{folder / 'all.toml'}: ")
     assert what in message
@@ -110,11 +109,11 @@ def test_a_stage_s_own_mistake_names_stage_and_file(folder):
     (folder / "bad.toml").write_text(toml(set_in(valid(), "recordings/fit", ["runs/none.csv"])))
     data = {**STAGES, "stages": [{"scenario": "first.toml"}, {"scenario": "bad.toml"}]}
     with pytest.raises(RecordingError) as caught:
-        load(folder, data)
+        loaded(folder, data)
     assert "all.toml: stages[2]: " in str(caught.value)
     assert "none.csv: no such file" in str(caught.value)
 
 
 def test_recordings_cannot_replace_those_of_all_stages(folder):
     with pytest.raises(ThsaCosimError, match="or run one stage alone"):
-        load(folder, STAGES, fit=["runs/warm.csv"])
+        loaded(folder, STAGES, fit=["runs/warm.csv"])

@@ -10,7 +10,7 @@ import pytest
 
 from thsa_cosim.errors import InputError
 from thsa_cosim.fmu import Plant
-from thsa_cosim.scenario import load_scenario
+from thsa_cosim.scenario import load
 from thsa_cosim.study import study_identity
 from thsa_cosim.study.case import build_case
 
@@ -58,7 +58,7 @@ def scenario(folder: Path, **more: Any) -> dict[str, Any]:
 
 
 def test_every_recording_gives_its_own_start_values(tmp_path: Path) -> None:
-    found = load_scenario(scenario(tmp_path, fixed={"b": 0.02}))
+    found = load(scenario(tmp_path, fixed={"b": 0.02}))
     cases = [build_case(found, r, found.fixed_for(r.name)) for r in found.fit]
     own = [{"controller.k_P": 100.0, "q_start": 0.1}, {"controller.k_P": 400.0, "q_start": -0.2}]
     assert [case.fixed for case in cases] == [{"b": 0.02, **values} for values in own]
@@ -70,10 +70,10 @@ def test_every_recording_gives_its_own_start_values(tmp_path: Path) -> None:
 
 
 def test_another_start_value_is_another_study(tmp_path: Path) -> None:
-    before = study_identity(load_scenario(scenario(tmp_path)))
+    before = study_identity(load(scenario(tmp_path)))
     asked = scenario(tmp_path)
     write(tmp_path / "b.parquet", 401.0, -0.2)
-    after = study_identity(load_scenario(asked))
+    after = study_identity(load(asked))
     assert [key for key in before if before[key] != after[key]] == ["recordings.fit[b]"]
 
 
@@ -97,4 +97,4 @@ def test_another_start_value_is_another_study(tmp_path: Path) -> None:
 )
 def test_a_start_value_that_cannot_be_is_refused(tmp_path: Path, more: dict[str, Any], says: str) -> None:
     with pytest.raises(InputError, match=says):
-        load_scenario(scenario(tmp_path, **more))
+        load(scenario(tmp_path, **more))

@@ -34,9 +34,9 @@ def test_an_example_runs_where_it_was_copied_to(
     assert cli.run_command(["example", "gearbox", "-o", "mine"]) == 0
     assert "thsa-cosim identify mine/scenarios/gearbox.toml" in capsys.readouterr().out
     assert cli.run_command(["example", "screw", "-o", "mine"]) == 0  # files that are the same stay
-    from thsa_cosim.scenario import load_scenario
+    from thsa_cosim.scenario import load
 
-    loaded = load_scenario(Path("mine/scenarios/gearbox.toml"))
+    loaded = load(Path("mine/scenarios/gearbox.toml"))
     assert loaded.fmu.path.resolve() == (tmp_path / "mine/fmus/Gearbox.fmu").resolve()
     assert modelica_package(Path("mine")) == Path("mine/modelica/THSA")
 
@@ -71,14 +71,14 @@ def test_a_wheel_is_preferred_and_an_incomplete_one_is_named(
 
 
 def test_a_diagnosis_finds_the_package_beside_its_scenario_or_the_shipped_one(tmp_path: Path) -> None:
-    from thsa_cosim.scenario import load_scenario
+    from thsa_cosim.scenario import load
 
     text = (ROOT / "scenarios" / "driven.toml").read_text()
     text = text.replace('package = "../modelica/THSA"\n', "")
     assert "package" not in tomllib.loads(text)["diagnose"]
     beside = copy_example("driven", tmp_path / "whole")[0]
     beside.write_text(text)
-    spec = load_scenario(beside).diagnose
+    spec = load(beside).diagnose
     assert spec is not None
     assert spec.package.resolve() == (tmp_path / "whole/modelica/THSA").resolve()
     alone = tmp_path / "alone" / "scenarios"
@@ -87,7 +87,7 @@ def test_a_diagnosis_finds_the_package_beside_its_scenario_or_the_shipped_one(tm
         '"recordings/', f'"{ROOT}/scenarios/recordings/'
     )
     (alone / "driven.toml").write_text(text)
-    spec = load_scenario(alone / "driven.toml").diagnose
+    spec = load(alone / "driven.toml").diagnose
     assert spec is not None
     assert spec.package == shipped("modelica", "THSA")
 

@@ -15,8 +15,7 @@ import pytest
 from small_scenario import toml, valid, write_folder
 
 from thsa_cosim import __version__
-from thsa_cosim.scenario import KINDS, Table, load_scenario
-from thsa_cosim.scenario import load as load_any
+from thsa_cosim.scenario import KINDS, Table, load
 from thsa_cosim.scenario.schema import StagesTable
 from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.ssv import ParameterSet, write_ssv
@@ -93,17 +92,17 @@ def test_what_is_left_out_is_in_the_schema_still() -> None:
 
 def test_a_table_that_means_something_by_being_there_counts(folder: Path) -> None:
     data = valid()
-    before = flatten(load(folder, data).table)
+    before = flatten(loaded(folder, data).table)
     data["parameters"][1]["law"] = {}
-    assert changed(before, flatten(load(folder, data).table)) == ["parameters[J].law"]
+    assert changed(before, flatten(loaded(folder, data).table)) == ["parameters[J].law"]
 
 
 def test_the_order_of_parameters_and_recordings_counts(folder: Path) -> None:
     data = valid()
-    before = study_identity(load(folder, data))
+    before = study_identity(loaded(folder, data))
     data["parameters"].reverse()
     data["recordings"]["fit"].reverse()
-    assert changed(before, study_identity(load(folder, data))) == [
+    assert changed(before, study_identity(loaded(folder, data))) == [
         "parameters (order)",
         "recordings.fit (order)",
     ]
@@ -122,10 +121,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def load(folder: Path, data: dict[str, Any]) -> Any:
+def loaded(folder: Path, data: dict[str, Any]) -> Any:
     file = folder / "small.toml"
     file.write_text(toml(data))
-    return load_any(file)
+    return load(file)
 
 
 def diagnosis() -> dict[str, Any]:
@@ -152,29 +151,29 @@ EDITS: dict[str, Callable[[Path], None]] = {
 
 @pytest.mark.parametrize("key", EDITS)
 def test_an_edited_file_is_another_study(folder: Path, key: str) -> None:
-    before = study_identity(load(folder, diagnosis()))
+    before = study_identity(loaded(folder, diagnosis()))
     EDITS[key](folder)
-    assert changed(before, study_identity(load(folder, diagnosis()))) == [key]
+    assert changed(before, study_identity(loaded(folder, diagnosis()))) == [key]
 
 
 def test_another_fmu_is_another_study(folder: Path) -> None:
-    before = study_identity(load(folder, valid()))
+    before = study_identity(loaded(folder, valid()))
     with zipfile.ZipFile(folder / "Small.fmu", "a") as archive:
         archive.writestr("resources/table.txt", "1 2 3")
-    assert changed(before, study_identity(load(folder, valid()))) == ["fmu"]
+    assert changed(before, study_identity(loaded(folder, valid()))) == ["fmu"]
 
 
 def test_where_the_files_lie_does_not_count(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
-    before = study_identity(load(folder, diagnosis()))
+    before = study_identity(loaded(folder, diagnosis()))
     elsewhere = tmp_path_factory.mktemp("elsewhere") / "moved"
     shutil.copytree(folder, elsewhere)
-    assert study_identity(load(elsewhere, diagnosis())) == before
+    assert study_identity(loaded(elsewhere, diagnosis())) == before
 
 
 def test_the_command_counts_and_seed_options_do(folder: Path) -> None:
-    scenario = load(folder, valid())
+    scenario = loaded(folder, valid())
     assert changed(study_identity(scenario), study_identity(scenario, "simulate")) == ["kind"]
-    seeded = load_scenario(folder / "small.toml", seed=11)
+    seeded = load(folder / "small.toml", seed=11)
     assert changed(study_identity(scenario), study_identity(seeded)) == ["seed"]
 
 
@@ -182,14 +181,14 @@ def test_stages_count_with_all_that_they_ask(folder: Path) -> None:
     (folder / "one.toml").write_text(toml(valid()))
     stages = folder / "stages.toml"
     stages.write_text(toml({"kind": "identify", "stages": [{"scenario": "one.toml"}]}))
-    before = stages_identity(load_any(stages))  # type: ignore[arg-type]
+    before = stages_identity(load(stages))  # type: ignore[arg-type]
     data = valid()
     data["parameters"][0]["upper"] = 6.0
     (folder / "one.toml").write_text(toml(data))
-    after = stages_identity(load_any(stages))  # type: ignore[arg-type]
+    after = stages_identity(load(stages))  # type: ignore[arg-type]
     assert changed(before, after) == ["stages[one].parameters[R_s].upper"]
     stages.write_text(toml({"kind": "identify", "stages": [{"scenario": "one.toml", "give": ["J"]}]}))
-    again = stages_identity(load_any(stages))  # type: ignore[arg-type]
+    again = stages_identity(load(stages))  # type: ignore[arg-type]
     assert changed(after, again) == ["stages[one].give"]
 
 
@@ -235,24 +234,24 @@ def identified(folder: Path) -> Path:
 
 
 def test_a_tuning_counts_its_start_values_and_how_sure_they_are(folder: Path, identified: Path) -> None:
-    before = study_identity(load(folder, tuning()))
+    before = study_identity(loaded(folder, tuning()))
     assert before["kind"] == "tune"
     assert before["start values.motor.gain"] == 2.0
     assert before["before.K_p"] == 0.12
     assert before["conditions.T_amb.values"] == [-30.0, 20.0]
     assert len(before["uncertainty.result"]) == 64
-    assert study_identity(load(folder, tuning())) == before
+    assert study_identity(loaded(folder, tuning())) == before
     edit(identified, "0.0001", "0.0002")
-    assert changed(before, study_identity(load(folder, tuning()))) == ["uncertainty.result"]
+    assert changed(before, study_identity(loaded(folder, tuning()))) == ["uncertainty.result"]
     edit(identified, "0.0002", "0.0001")
     EDITS["start values.motor.gain"](folder)
-    assert changed(before, study_identity(load(folder, tuning()))) == ["start values.motor.gain"]
-    sure = study_identity(load(folder, {k: v for k, v in tuning().items() if k != "uncertainty"}))
+    assert changed(before, study_identity(loaded(folder, tuning()))) == ["start values.motor.gain"]
+    sure = study_identity(loaded(folder, {k: v for k, v in tuning().items() if k != "uncertainty"}))
     assert not [key for key in sure if key.startswith("uncertainty")]
 
 
 def test_a_scenario_is_asked_key_by_key(folder: Path) -> None:
-    scenario = load(folder, valid())
+    scenario = loaded(folder, valid())
     asked = study_identity(scenario)
     expected = {
         "kind": "identify",
@@ -286,7 +285,7 @@ def test_a_scenario_is_asked_key_by_key(folder: Path) -> None:
 
 
 def test_only_a_diagnosis_counts_the_model_and_the_effects(folder: Path) -> None:
-    scenario = load(folder, diagnosis())
+    scenario = loaded(folder, diagnosis())
     content = {key for key in study_identity(scenario) if key in ("diagnose.package", "diagnose.catalogue")}
     assert content == {"diagnose.package", "diagnose.catalogue"}
     other = study_identity(scenario, "identify")
@@ -299,7 +298,7 @@ def test_only_a_diagnosis_counts_the_model_and_the_effects(folder: Path) -> None
 
 
 def test_a_start_value_of_one_temperature_counts_by_its_name(folder: Path) -> None:
-    scenario = load(folder, valid())
+    scenario = loaded(folder, valid())
     cold = scenario.points[0]
     asked = study_identity(scenario.given({cold.temperature_degC: {"motor.gain": 4.0}}))
     assert changed(study_identity(scenario), asked) == [f"start values[{cold.label}].motor.gain"]
@@ -307,7 +306,7 @@ def test_a_start_value_of_one_temperature_counts_by_its_name(folder: Path) -> No
 
 
 def test_the_lead_in_counts(folder: Path) -> None:
-    recording = load(folder, valid()).fit[0]
+    recording = loaded(folder, valid()).fit[0]
     digests = {digest_of_recording(replace(recording, lead_in=t)) for t in (0.0, 0.1, 0.2)}
     assert len(digests) == 3
 
@@ -319,7 +318,7 @@ def test_stages_are_asked_in_their_order_and_with_one_version(folder: Path) -> N
 
     def asked(*names: str) -> dict[str, Any]:
         stages.write_text(toml({"kind": "identify", "stages": [{"scenario": f"{n}.toml"} for n in names]}))
-        return stages_identity(load_any(stages))  # type: ignore[arg-type]
+        return stages_identity(load(stages))  # type: ignore[arg-type]
 
     before = asked("one", "two")
     assert before["kind"] == "identify in stages"

@@ -13,7 +13,7 @@ from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu.description import DefaultExperiment
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.system import SystemPlant, read_description
-from thsa_cosim.system.assemble import Part, Wire, assemble
+from thsa_cosim.system.assemble import Part, Wire, assemble, assembled
 from thsa_cosim.system.write import write_ssp
 
 FMUS = Path(__file__).parents[2] / "fmus"
@@ -122,6 +122,28 @@ def test_a_written_system_is_read_back_and_written_the_same(tmp_path: Path) -> N
     assert description.default_experiment == DefaultExperiment(0.0, 2.0)
     twin = write_ssp(again, archives, tmp_path / "b.ssp", description.default_experiment)
     assert twin.read_bytes() == path.read_bytes()
+
+
+def test_what_is_said_of_a_system_as_it_is_written_is_what_its_archive_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    slow = Part("slow", build.lag3(), "sampled", 0.01, 0.005, {"k": 3.0})
+    wires = [RING[0], replace(RING[1], disturbance="d")]
+    described = assembled("ring", [Part("fast", build.lag2()), slow], wires, {"y": ["slow.y"]})
+    again = read_description(described.path)
+    assert described.path.parent.parent == tmp_path / "thsa-cosim" / "systems"
+    for own in (
+        "sha256",
+        "variables",
+        "pins",
+        "default_experiment",
+        "capabilities",
+        "states",
+        "tool",
+        "model_name",
+    ):
+        assert getattr(again, own) == getattr(described, own), own
 
 
 def test_fmpy_reads_and_runs_what_we_write(tmp_path: Path) -> None:

@@ -298,11 +298,11 @@ variables = { F_fn = "nut.F_fn.a0" }
 )
 def test_wrong_keys_and_values_are_one_sentence(tmp_path: Path, old: str, new: str, said: str) -> None:
     from thsa_cosim.errors import InputError
-    from thsa_cosim.scenario import load_tune
+    from thsa_cosim.scenario import load
 
     path = scenario(tmp_path, **{old: new})
     with pytest.raises(InputError) as caught:
-        load_tune(path)
+        load(path)
     text = str(caught.value)
     assert said in text
     assert str(path) in text

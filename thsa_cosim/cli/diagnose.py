@@ -60,6 +60,6 @@ def _print_next(folder: Path, result: Mapping[str, Any]) -> None:
 
 def _own(scenario: Path) -> tuple[Path, ...]:
     """The scenario's own fit recordings."""
-    from thsa_cosim.scenario import load_scenario  # imports take their time
+    from thsa_cosim.scenario import Scenario, load  # imports take their time
 
-    return tuple(dict.fromkeys(recording.path for recording in load_scenario(scenario).fit))
+    return tuple(dict.fromkeys(recording.path for recording in load(scenario, Scenario).fit))

@@ -53,7 +53,7 @@ def init(
     from thsa_cosim.draft import draft_scenario
     from thsa_cosim.report.inspection import print_inspection
     from thsa_cosim.report.preview import write_preview
-    from thsa_cosim.scenario import load_scenario
+    from thsa_cosim.scenario import Scenario, load
     from thsa_cosim.system import read_description
 
     fmu, recordings = _sorted(files, fmu, recordings)
@@ -64,7 +64,7 @@ def init(
     output.write_text(draft.text, encoding="utf-8")
     _print(draft)
     try:
-        scenario = load_scenario(output)
+        scenario = load(output, Scenario)
     except InputError as error:
         raise InputError(
             f"{output} was written, but does not load yet; correct it by hand: {error}"

@@ -1,5 +1,6 @@
 """Flat model → explicit ordinary differential equation with outputs, events and initial values (CasADi SX)."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
@@ -13,6 +14,9 @@ from thsa_cosim.export.solve import HOMOTOPY, Block, EquationSystem
 from thsa_cosim.export.uniqueness import several_solutions
 from thsa_cosim.modelica.flat import Assertion, FlatEquation, FlatModel, FlatVariable
 from thsa_cosim.modelica.terms import Scalar, Term, make, plain, substitute, text, walk
+
+INFINITE = 1e100
+"""Stands for Modelica.Constants.inf as a start value ("not yet"): sums with it have to stay finite."""
 
 
 @dataclass(frozen=True)
@@ -408,12 +412,13 @@ class _Builder:
             k = states.index(reinit.state)
             fresh[k] = ca.if_else(condition, value, fresh[k])
         starts = [initial.free.get(n, self._z_start(n)) for n in memory.names]
-        samples = [ca.horzcat(start, interval) for start, interval, _ in memory.samples]
+        samples = [final(ca.horzcat(start, interval)) for start, interval, _ in memory.samples]
+        held = memory.symbols() | {v.name for v in (*self.parameters, *self.dependents)}
         for times in samples:
-            if any(str(s) in memory.symbols() for s in ca.symvar(times)):
+            varying = {str(s) for s in ca.symvar(times)} - held
+            if varying:
                 raise ModelicaError(
-                    f"{self.flat.name}: a sample() whose times the initial equations determine (as from the start of "
-                    "the simulation) is a limit of this exporter."
+                    f"{self.flat.name}: the times of a sample() have to be parameters, but depend on {min(varying)}."
                 )
         return Events(
             z=tuple(memory.names),
@@ -453,7 +458,10 @@ class _Builder:
         variable = self.flat.variables.get(name)
         if variable is None:
             return self.memory.updates[name]
-        return self.translator.real(0.0 if variable.start is None else variable.start, events=False)
+        start = self.translator.real(0.0 if variable.start is None else variable.start, events=False)
+        if start.is_constant() and abs(float(start)) > INFINITE:
+            return ca.SX(math.copysign(INFINITE, float(start)))
+        return start
 
     @staticmethod
     def _preference(variable: FlatVariable) -> tuple[int, ...]:

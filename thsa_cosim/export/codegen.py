@@ -274,7 +274,7 @@ _ARGUMENTS = {
     "reinit": f"{_POINT}, double *x_new",
     "assertions": f"{_POINT}, double *a",
     "time_slopes": f"{_POINT}, double *s",
-    "samples": "const double *p, const double *d, double *s",
+    "samples": "const double *p, const double *d, const double *m, double *s",
     "directional": f"{_POINT}, const double *sx, const double *su, const double *sp, double *ddx, double *dw",
 }
 

@@ -83,7 +83,7 @@ class Implicit:
                 ]
             if self.size:
                 lines.append("  double *v = implicit_of(d);")
-                if name == "discrete_start":
+                if name == "discrete_start" and ca.depends_on(self.model.events.z_start, self.model.y):
                     lines.append("  if (solve(t, x, u, p, d, m)) return 1;")
                 lines.append("  (void)v;")
             return lines

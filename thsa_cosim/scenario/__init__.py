@@ -16,7 +16,6 @@ from thsa_cosim.scenario.model import (
     Scenario,
     TemperaturePoint,
 )
-from thsa_cosim.scenario.recorded import load_scenario
 from thsa_cosim.scenario.schema import (
     KINDS,
     BalanceTable,
@@ -28,7 +27,6 @@ from thsa_cosim.scenario.schema import (
 from thsa_cosim.scenario.source import Source
 from thsa_cosim.scenario.stages import Stage, StagedScenario, hand_on
 from thsa_cosim.scenario.table import Table
-from thsa_cosim.scenario.tune_load import load_tune
 from thsa_cosim.scenario.tune_model import TuneScenario
 
 __all__ = [
@@ -54,6 +52,4 @@ __all__ = [
     "TuneScenario",
     "hand_on",
     "load",
-    "load_scenario",
-    "load_tune",
 ]

@@ -1,13 +1,10 @@
-"""From the file to a :class:`Scenario`, which has recordings: files read, units converted, everything checked."""
+"""From its table to a :class:`Scenario`, which has recordings: files read, units converted, everything checked."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from pydantic import ValidationError
-
-from thsa_cosim.errors import InputError, ScenarioError, did_you_mean
+from thsa_cosim.errors import ScenarioError, did_you_mean
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Column, Recording, TimeAxis, read_recording
@@ -17,7 +14,6 @@ from thsa_cosim.scenario.law_search import with_laws
 from thsa_cosim.scenario.model import Scenario, TemperaturePoint
 from thsa_cosim.scenario.recording_schema import TemperatureTable
 from thsa_cosim.scenario.schema import (
-    KINDS,
     ChannelTable,
     CommonTable,
     CostTable,
@@ -27,64 +23,10 @@ from thsa_cosim.scenario.schema import (
     SearchTable,
     SimulateTable,
 )
-from thsa_cosim.scenario.sentences import from_validation, one_line
-from thsa_cosim.scenario.source import Source, about_kind, read_source
 from thsa_cosim.scenario.system import open_model
 
 
-def load_scenario(
-    source: Source,
-    *,
-    fit: Sequence[Path | str] = (),
-    validate: Sequence[Path | str] = (),
-    seed: int | None = None,
-    fmu: FmuDescription | Path | str | None = None,
-) -> Scenario:
-    """Read, check and resolve a scenario file.
-
-    Parameters
-    ----------
-    source
-        The TOML file, to which paths in it are relative; or its content (see ``Source``).
-    fit, validate
-        Recordings (or globs, relative to the working directory) instead of the scenario's own.
-    seed
-        Replaces the scenario's seed.
-    fmu
-        An FMU, or its description, instead of the scenario's own.
-
-    Raises
-    ------
-    ScenarioError
-        For a key, value or reference that is wrong.
-    FmuError, RecordingError, ParameterError, UnitError, MissingExtraError
-        As the files that it names deserve. Every message is one line.
-    """
-    path, data = read_source(source)
-    table = parse(path, data)
-    try:
-        return _resolve(path, table, fit, validate, seed, fmu)
-    except InputError as error:
-        message = str(error) if str(path) in str(error) else f"{path}: {error}"
-        raise type(error)(one_line(message)) from None
-
-
-def parse(path: Path, data: Mapping[str, Any]) -> CommonTable:
-    """Return the tables as their kind's pydantic model; ScenarioError in one sentence."""
-    kind = data.get("kind")
-    if kind == "tune":
-        raise ScenarioError(one_line(f"{path}: kind is 'tune': run 'thsa-cosim tune {path}'."))
-    if not isinstance(kind, str) or kind not in KINDS:
-        what, hint = about_kind(data, [*KINDS, "tune"])
-        supported = " or ".join(f'"{k}"' for k in (*KINDS, "tune"))
-        raise ScenarioError(one_line(f"{path}: kind {what}; supported kinds are {supported}.{hint}"))
-    try:
-        return KINDS[kind].model_validate(data)
-    except ValidationError as error:
-        raise from_validation(path, data, error) from None
-
-
-def _resolve(
+def resolve_recorded(
     path: Path,
     table: CommonTable,
     fit: Sequence[Path | str],
@@ -92,6 +34,7 @@ def _resolve(
     seed: int | None,
     fmu: FmuDescription | Path | str | None,
 ) -> Scenario:
+    """Return the scenario of ``table``; arguments and errors as of ``load``."""
     description = open_model(path, table, fmu)
     inputs, measured = check.roles(table, description)
     started = check.started(table, description)

@@ -1,20 +1,17 @@
-"""From the TOML file of a tuning to a :class:`TuneScenario`, checked against its FMU."""
+"""From the table of a tuning to a :class:`TuneScenario`, checked against its FMU."""
 
 import importlib.util
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from pydantic import ValidationError
 
-from thsa_cosim.errors import InputError, MissingExtraError, ScenarioError, UnitError, did_you_mean
+from thsa_cosim.errors import MissingExtraError, ScenarioError, UnitError, did_you_mean
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import check
-from thsa_cosim.scenario.schema import KINDS, SearchTable
-from thsa_cosim.scenario.sentences import from_validation, one_line
-from thsa_cosim.scenario.source import Source, about_kind, read_source
+from thsa_cosim.scenario.schema import SearchTable
 from thsa_cosim.scenario.system import open_model
 from thsa_cosim.scenario.tune_drawn import checked_line, checked_pareto, checked_surface
 from thsa_cosim.scenario.tune_model import (
@@ -45,39 +42,11 @@ from thsa_cosim.system.description import SystemDescription
 from thsa_cosim.units import convert
 
 
-def load_tune(source: Source, *, seed: int | None = None, fmu: Path | str | None = None) -> TuneScenario:
-    """Read, check and resolve a scenario of kind "tune".
-
-    ``seed`` and ``fmu`` replace the scenario's own.
-
-    Raises
-    ------
-    ScenarioError
-        For a key, value or reference that is wrong.
-    FmuError, ParameterError, UnitError
-        As the FMU and the values deserve. Every message is one line.
-    """
-    path, data = read_source(source)
-    kind = data.get("kind")
-    if kind != "tune":
-        if isinstance(kind, str) and kind in KINDS:
-            raise ScenarioError(
-                one_line(f"{path} is a scenario of kind {kind!r}: run 'thsa-cosim {kind} {path}'.")
-            )
-        what, hint = about_kind(data, ["tune"])
-        raise ScenarioError(one_line(f'{path}: kind {what}; thsa-cosim tune takes kind = "tune".{hint}'))
-    try:
-        table = TuneTable.model_validate(data)
-    except ValidationError as error:
-        raise from_validation(path, data, error) from None
-    try:
-        return _resolve(path, table, seed, open_model(path, table, fmu))
-    except InputError as error:
-        message = str(error) if str(path) in str(error) else f"{path}: {error}"
-        raise type(error)(one_line(message)) from None
-
-
-def _resolve(path: Path, table: TuneTable, seed: int | None, fmu: FmuDescription) -> TuneScenario:
+def resolve_tune(
+    path: Path, table: TuneTable, seed: int | None, model: FmuDescription | Path | str | None
+) -> TuneScenario:
+    """Return the scenario of ``table``; arguments (``model`` is ``fmu``) and errors as of ``load``."""
+    fmu = open_model(path, table, model)
     profiles = _profiles(table, fmu, read_profiles(path, table, fmu))
     command = profiles[0].command if profiles else _command(table, fmu)
     axes = tuple(_axis(name, axis, fmu, f"conditions.{name}") for name, axis in table.conditions.items())

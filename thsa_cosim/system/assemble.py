@@ -10,6 +10,7 @@ from thsa_cosim.errors import FmuError, did_you_mean
 from thsa_cosim.fmu.archive import sha256_of
 from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription
 from thsa_cosim.fmu.description import read_description as read_fmu
+from thsa_cosim.system.description import SystemDescription, describe_system
 from thsa_cosim.system.structure import (
     Component,
     Connection,
@@ -108,8 +109,8 @@ def system_folder() -> Path:
 
 def assembled(
     name: str, parts: Sequence[Part], wires: Sequence[Wire], connectors: Mapping[str, Sequence[str]]
-) -> Path:
-    """Write the system as an archive into the user's cache folder, named after its content, and return its path."""
+) -> SystemDescription:
+    """Write the system as an archive into the user's cache folder, named after its content, and describe it."""
     system, archives = assemble(name, parts, wires, connectors)
     folder = system_folder()
     stops = [c.fmu.default_experiment.stop for c in system.components if c.fmu.default_experiment.stop]
@@ -117,12 +118,12 @@ def assembled(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         draft = write_ssp(system, archives, folder / f"{os.getpid()}.ssp", experiment)
-        digest = hashlib.sha256(draft.read_bytes()).hexdigest()[:24]
-        final = folder / digest / f"{name}.ssp"
+        digest = hashlib.sha256(draft.read_bytes()).hexdigest()
+        final = folder / digest[:24] / f"{name}.ssp"
         final.parent.mkdir(exist_ok=True)
         draft.replace(final)
     except OSError as error:
         raise FmuError(
             f"the system cannot be kept in {folder} ({error.strerror or error}); set XDG_CACHE_HOME to another folder."
         ) from None
-    return final
+    return describe_system(system, final, digest, experiment)

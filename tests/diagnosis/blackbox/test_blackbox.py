@@ -19,7 +19,7 @@ from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
 from thsa_cosim.diagnosis.blackbox.wrapper import EffectWrapper, Term, laws, sign_of
 from thsa_cosim.errors import FmuError, ScenarioError
 from thsa_cosim.fmu import Plant
-from thsa_cosim.scenario import BlackBoxSpec, load_scenario
+from thsa_cosim.scenario import BlackBoxSpec, load
 from thsa_cosim.signals import Signals
 
 ROOT = Path(__file__).parents[3]
@@ -222,13 +222,13 @@ def test_black_box_needs_names(tmp_path: Path) -> None:
     path = tmp_path / "s.toml"
     text = scenario_text().replace("_fit_*", "_fit_1").replace("_validate_*", "_validate_1")
     path.write_text(text, encoding="utf-8")
-    assert load_scenario(path).diagnose.blackbox == NAMES  # type: ignore[union-attr]
+    assert load(path).diagnose.blackbox == NAMES  # type: ignore[union-attr]
     path.write_text(text.replace('speed = "v"', 'speed = "velocity"', 1), encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"diagnose\.blackbox\.speed.*velocity"):
-        load_scenario(path)
+        load(path)
     path.write_text(re.sub(r"\[diagnose\.blackbox\]\n(.*\n)*?\n", "\n", text), encoding="utf-8")
     with pytest.raises(ScenarioError, match="needs either model"):
-        load_scenario(path)
+        load(path)
 
 
 @pytest.mark.nightly

@@ -1,6 +1,7 @@
 """Forms of one effect: the one that fits takes over, and what fits as well makes the stated errors larger."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
@@ -9,13 +10,17 @@ import numpy as np
 import pytest
 
 from diagnosis.analytic import DECLARED, bench, candidates, unknowns
+from thsa_cosim.diagnosis.choosing import forms as room
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged
-from thsa_cosim.diagnosis.choosing.forms import likelihood
-from thsa_cosim.diagnosis.choosing.score import held_shapes
+from thsa_cosim.diagnosis.choosing.forms import best_form, criterion, likelihood
+from thsa_cosim.diagnosis.choosing.score import Scored, held_shapes
+from thsa_cosim.diagnosis.choosing.selection import RIVAL_SHARE, RIVAL_WORTH
 from thsa_cosim.diagnosis.choosing.spread import between_models
 from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.uncertainty import standard_errors
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 
 SEEDS = 20
 HESS_SOOM = {"motorEffect.hessSoom.dF": 0.6, "motorEffect.hessSoom.v_S": 4.0}
@@ -112,3 +117,181 @@ def test_a_form_that_fits_worse_counts_by_its_likelihood():
     assert likelihood(fitted(104.0), fitted(100.0)) == pytest.approx(np.exp(-2.0))
     assert likelihood(fitted(104.0), fitted(100.0, 2.0)) == pytest.approx(np.exp(-1.0))
     assert likelihood(fitted(90.0), fitted(100.0)) == 1.0
+
+
+def test_a_further_coefficient_has_to_earn_two_and_doubtful_noise_makes_a_lead_smaller():
+    def fitted(cost: float, size: int) -> Any:
+        return SimpleNamespace(fit=SimpleNamespace(cost=cost, vector=np.zeros(size)))
+
+    assert criterion(fitted(100.0, 3), 1.0) == 106.0
+    assert criterion(fitted(100.0, 4), 1.0) - criterion(fitted(102.0, 3), 1.0) == 0.0
+    assert criterion(fitted(100.0, 3), 4.0) == 31.0
+
+
+def form(name: str, cost: float = 100.0, gain: float = 100.0, **more: Any) -> Any:
+    """A fitted form of one effect at the motor, in a block of its own; ``instead``: it is never screened itself."""
+    candidate = SimpleNamespace(
+        name=more.get("effect", "a:motor"),
+        slot=SimpleNamespace(name=more.get("place", "motor")),
+        key=f"a:motor/{name}",
+        component=more.get("component", name),
+        variant=SimpleNamespace(instead=more.get("instead", False), beside=more.get("beside", False)),
+        parameters=[SimpleNamespace(scanned=more.get("scanned", False))],
+    )
+    names = ("p", f"motor.{candidate.component}.{more.get('own', 'k')}")
+    members = tuple(Unknown(n, n, "1", 0.0, np.inf, 1.0, -99.0, 99.0, declared=n == "p") for n in names)
+    vector = np.array(more.get("vector", [0.0, 0.0]))
+    fit = Fit(Unknowns(members), vector, np.ones(9), np.eye(9, 2), np.ones(2), cost, True)
+    proposal = SimpleNamespace(candidate=candidate, gain=more.get("promised", gain))
+    return Scored(proposal, fit, np.zeros(9), gain, gain, 9.0, 1.0)  # type: ignore[arg-type]
+
+
+class Forms:
+    """Stands for a `Selection` whose fits are there already, and for what is said of them."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.bench, self.current, self.held = object(), object(), object()
+        self.leads: dict[tuple[str, str], float] = {}
+        self.started: list[Any] = []
+        self.asked: list[Any] = []
+        self.screened: list[Any] = []
+        self.known: dict[str, Any] = {}
+        self.promised: list[Any] = []
+        self.weak: set[str] = set()
+        self.ended: set[int] = set()
+        monkeypatch.setattr(room, "_lead", self.lead)
+        monkeypatch.setattr(room, "insignificant", lambda s: "weak" if s.candidate.key in self.weak else "")
+        monkeypatch.setattr(room, "out_of_range", lambda fit: "p" if id(fit) in self.ended else "")
+        monkeypatch.setattr(room, "polish", self.polish)
+        monkeypatch.setattr(room, "propose", self.propose)
+        monkeypatch.setattr(room, "shape_starts", lambda candidate, scanned, known: [{"n": 1.0}, {"n": 2.0}])
+
+    def lead(self, selection: Any, one: Any, other: Any) -> float:
+        assert selection is self
+        return self.leads.get((one.candidate.key[-1], other.candidate.key[-1]), 0.0)
+
+    def polish(self, bench: Any, one: Any, current: Any, held: Any) -> Any:
+        assert (bench, current, held) == (self.bench, self.current, self.held)
+        self.started.append(one)
+        return one
+
+    def polished(self, one: Any) -> Any:
+        return one
+
+    def fitted(self, proposals: Any) -> list[Any]:
+        self.asked += [p.candidate.key[-1] for p in proposals]
+        return [self.known[p.candidate.key[-1]] for p in proposals if p.candidate.key[-1] in self.known]
+
+    def propose(self, bench: Any, current: Any, rows: Any) -> list[Any]:
+        assert (bench, current) == (self.bench, self.current)
+        self.screened.append([(c.key[-1], shapes["n"]) for c, shapes in rows])
+        return self.promised
+
+    def best(
+        self, choice: Any, *others: Any, proposals: Any = (), offered: Any = ()
+    ) -> tuple[str, list[str]]:
+        best, alike = best_form(self, choice, [choice, *others], proposals, offered)  # type: ignore[arg-type]
+        return best.candidate.key[-1], [s.candidate.key[-1] for s in alike]
+
+
+@pytest.fixture
+def forms(monkeypatch: pytest.MonkeyPatch) -> Forms:
+    return Forms(monkeypatch)
+
+
+def test_the_form_with_the_best_criterion_takes_over_and_the_others_are_as_likely(forms: Forms):
+    choice = form("c")
+    assert forms.best(choice, form("a", 90.0), form("b", 80.0)) == ("b", ["c", "a"])
+    assert forms.best(choice, form("a", 100.0)) == ("c", ["a"]), "no better: the first stays"
+    assert forms.best(choice) == ("c", [])
+
+
+def test_the_best_one_is_compared_first(forms: Forms):
+    """It explains the held-out recordings as well as the choice, though not as well as a form that comes second."""
+    forms.leads[("a", "b")] = 4.0
+    assert forms.best(form("c"), form("a", 90.0), form("b", 80.0)) == ("b", ["c", "a"])
+
+
+def test_a_form_that_fits_better_has_to_hold_on_the_held_out_recordings_and_to_be_believed(forms: Forms):
+    choice, better = form("c"), form("a", 90.0)
+    forms.leads[("c", "a")] = 3.0
+    assert forms.best(choice, better) == ("c", []), "three standard errors are apart"
+    forms.leads[("c", "a")] = 2.99
+    assert forms.best(choice, better) == ("a", ["c"])
+    forms.weak.add(better.candidate.key)
+    assert forms.best(choice, better) == ("c", ["a"])
+    forms.weak.clear()
+    forms.ended.add(id(better.fit))
+    assert forms.best(choice, better) == ("c", ["a"])
+
+
+def test_a_form_that_gains_far_less_is_not_compared_unless_it_is_one_for_this_alone(forms: Forms):
+    choice, least = form("c"), RIVAL_SHARE * 100.0
+    assert forms.best(choice, form("a", 90.0, least)) == ("a", ["c"])
+    assert forms.best(choice, form("a", 90.0, least - 0.1)) == ("c", [])
+    assert forms.best(choice, form("a", 90.0, 1.0, instead=True)) == ("a", ["c"])
+
+
+def test_only_other_formulas_of_the_effect_in_its_place_are_forms(forms: Forms):
+    choice = form("c")
+    for other in (
+        form("a", 90.0, effect="b:motor"),
+        form("a", 90.0, place="gear"),
+        form("a", 90.0, beside=True),
+        form("a", 90.0, scanned=True),
+    ):
+        assert forms.best(choice, other) == ("c", [])
+    assert forms.best(choice, form("c", 90.0)) == ("c", []), "the same one is no other"
+
+
+def test_a_form_of_the_same_block_is_fitted_from_the_optimum_of_the_choice(forms: Forms):
+    choice = form("c", component="x", vector=[1.0, 2.0])
+    wider = form("a", component="x", vector=[5.0, 6.0])
+    own = form("b", component="x", own="n", vector=[5.0, 6.0])
+    apart = form("d", component="y", vector=[5.0, 6.0])
+    forms.best(choice, wider, own, apart)
+    assert [(s.candidate.key[-1], *s.fit.vector) for s in forms.started] == [("a", 1.0, 2.0), ("b", 1.0, 6.0)]
+
+
+def test_a_form_of_another_block_is_fitted_once_with_all_parameters(
+    forms: Forms, monkeypatch: pytest.MonkeyPatch
+):
+    """A rival's fit is at hand already where the comparison needed it."""
+    choice, apart = form("c"), form("d", 90.0)
+    whole = replace(apart, fit=replace(apart.fit, cost=70.0))
+    monkeypatch.setattr(forms, "polished", lambda one: whole if one is apart else one)
+    best, alike = best_form(forms, choice, [apart], [], [])  # type: ignore[arg-type]
+    assert best is whole
+    assert alike == (choice,)
+    assert forms.started == []
+
+
+def test_forms_that_were_not_refined_are_screened_and_the_best_start_of_each_is_fitted(forms: Forms):
+    choice = form("c")
+    less = RIVAL_WORTH * 100.0
+    forms.promised = [
+        form("a", promised=50.0).proposal,
+        form("a", promised=60.0).proposal,
+        form("b", promised=less).proposal,
+        form("d", promised=less - 0.1).proposal,
+        form("e", promised=99.0, effect="b:motor").proposal,
+        form("c", promised=99.0).proposal,
+    ]
+    forms.known = {"a": form("a", 80.0), "b": form("b", 90.0)}
+    offered = [
+        form("a", instead=True).candidate,
+        form("b").candidate,
+        form("e", effect="b:motor", instead=True).candidate,
+    ]
+    assert forms.best(choice, offered=offered) == ("a", ["c", "b"])
+    assert forms.screened == [[("a", 1.0), ("a", 2.0)]]
+    assert forms.asked == ["a", "b"], "best first"
+    assert forms.best(choice, form("a"), offered=offered)[0] == "b"
+    assert forms.asked[2:] == ["b"], "what is fitted already is not fitted again"
+
+
+def test_nothing_is_screened_where_no_form_waits_for_it(forms: Forms):
+    proposals = [form("a", promised=50.0).proposal]
+    forms.known = {"a": form("a", 80.0)}
+    assert forms.best(form("c"), proposals=proposals, offered=[form("b").candidate]) == ("a", ["c"])
+    assert forms.screened == []

@@ -61,6 +61,17 @@ def test_a_form_widens_coefficients_of_its_name_in_another_block_and_shapes_in_t
     np.testing.assert_allclose(added(winner, forms=(model([1.0, 4.5, 3.0]),)), [0.0, 0.5, 1.0])
 
 
+def test_an_unknown_of_the_final_model_that_the_round_had_not_is_passed_over(errors: dict[int, list[float]]):
+    winner, rival = model([1.0, 4.0, 2.0]), model([1.6, 9.0, 9.0], block="y", effect="b:motor")
+    one = SimpleNamespace(accepted=winner, rivals=(rival,), forms=())
+    found: Any = SimpleNamespace(accepted=(winner,), rounds=(one,))
+    members = winner.fit.unknowns.members
+    later = replace(
+        winner.fit, unknowns=Unknowns((*members[1:], members[0])), vector=np.array([4.0, 2.0, 1.0])
+    )
+    np.testing.assert_allclose(between_models(found, later, ()), [0.0, 0.0, 0.6], atol=1e-12)
+
+
 def test_what_a_form_is_less_sure_of_counts_and_what_it_is_surer_of_does_not(errors: dict[int, list[float]]):
     winner, wide = model([1.0, 4.0, 2.0]), model([1.0, 4.0, 2.0])
     errors[id(wide.fit)] = [3.0, 0.5, np.inf]

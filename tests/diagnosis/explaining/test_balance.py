@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from thsa_cosim.diagnosis.explaining.balance import close_balances, formulas_of, record_of
 from thsa_cosim.diagnosis.results import Balance
 from thsa_cosim.errors import ScenarioError
-from thsa_cosim.scenario import Scenario, load_scenario
+from thsa_cosim.scenario import Scenario, load
 from thsa_cosim.scenario.formula import parse_formula
 
 FMU = Path(__file__).parents[3] / "fmus" / "THSA.fmu"
@@ -101,7 +101,7 @@ def scenario_of(folder: Path, data: pd.DataFrame, *balances: dict, start: float 
         lines += ["[[diagnose.balances]]", *(f"{k} = {json.dumps(v)}" for k, v in balance.items())]
     path = folder / "scenario.toml"
     path.write_text("\n".join(lines), encoding="utf-8")
-    return load_scenario(path)
+    return load(path)
 
 
 def passing(band: float) -> float:

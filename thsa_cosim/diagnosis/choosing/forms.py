@@ -33,7 +33,7 @@ def best_form(
     ]
     least = RIVAL_SHARE * choice.fit_gain
     near = [s for s in fitted if s.candidate.variant.instead or s.fit_gain >= least]
-    forms = [polish(selection.bench, _from(s, choice), selection.current, selection.held) for s in near]
+    forms = [_polished(selection, s, choice) for s in near]
     limit = choice.fit.inflation
     best = choice
     for one in sorted(forms, key=lambda s: criterion(s, limit)):
@@ -44,13 +44,14 @@ def best_form(
     return best, tuple(alike)
 
 
-def _from(one: Scored, choice: Scored) -> Scored:
-    """``one`` from the optimum of ``choice`` where that is a form of the same block, of which it may be a wider one."""
+def _polished(selection: Selection, one: Scored, choice: Scored) -> Scored:
+    """``one`` with all parameters fitted, from the optimum of ``choice`` where it may be a wider form of its block."""
     if one.candidate.component != choice.candidate.component:
-        return one
+        return selection.polished(one)
     values = {**one.fit.unknowns.named(one.fit.vector), **choice.fit.unknowns.named(choice.fit.vector)}
     vector = np.array([values[name] for name in one.fit.unknowns.names])
-    return replace(one, fit=replace(one.fit, vector=vector))
+    start = replace(one, fit=replace(one.fit, vector=vector))
+    return polish(selection.bench, start, selection.current, selection.held)
 
 
 def criterion(one: Scored, inflation: float) -> float:

@@ -1,7 +1,7 @@
 """Ripples at an order of the machine: the order is an integer and is not fitted, unless a free one explains more.
 
 What repeats with a shaft repeats a whole number of times per turn. Where a ripple makes a machine stick and slip, a fit
-that may also move the order ends beside it: a small change of the order makes up for a wrong phase.
+that may also move the order misses it: a small change of the order makes up for a wrong phase.
 """
 
 from collections.abc import Sequence

@@ -14,6 +14,9 @@ from thsa_cosim.signals import Signals
 from thsa_cosim.system.description import SystemDescription, loops
 from thsa_cosim.system.write import write_halved
 
+_NOTES = 3
+"""So many notes of an archive are spelled out."""
+
 
 def system_lines(description: SystemDescription) -> Iterator[tuple[str, Judged]]:
     """Yield (name, line) of what the archive alone shows."""
@@ -25,6 +28,9 @@ def system_lines(description: SystemDescription) -> Iterator[tuple[str, Judged]]
     lacking = f"no library for this machine in {', '.join(missing)}"
     text = lacking if missing else "every component has a binary for here"
     yield "platform", (Verdict.FAILED if missing else Verdict.OK, text, {})
+    if notes := description.system.notes:
+        more = f" (and {len(notes) - _NOTES} more)" if len(notes) > _NOTES else ""
+        yield "parameter sets", (Verdict.WARNING, " ".join(notes[:_NOTES]) + more, {"ignored": len(notes)})
     found = loops(description.system)
     text = f"solved at every evaluation: {'; '.join(found)}" if found else "none"
     yield "algebraic loops", (Verdict.WARNING if found else Verdict.OK, text, {"loops": len(found)})

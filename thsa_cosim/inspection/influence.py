@@ -112,8 +112,8 @@ def _stretches(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
         for first, last in _pieces(len(recordings) > 1):
             normal = fit.normal - np.sum(normals[first:last], axis=0)
             moved = fit.step(normal, gradient - np.sum(gradients[first:last], axis=0)) - undone
-            chance = np.sqrt(inflation * np.maximum(fit.variance(normal) - whole, 1e-6 * whole))
-            with np.errstate(invalid="ignore"):
+            with np.errstate(invalid="ignore"):  # of what nothing depends on
+                chance = np.sqrt(inflation * np.maximum(fit.variance(normal) - whole, 1e-6 * whole))
                 sure = np.where(np.abs(moved) > _MOVED * fit.stderr, np.abs(moved) / chance, 0.0)
             k = int(np.argmax(np.nan_to_num(sure)))
             if sure[k] > _SURE and (best is None or sure[k] > best[0]):

@@ -161,8 +161,8 @@ class SystemInstance(Instance):
                     value[0] = self._wiring.disturbance[self._disturbed[own]]
                 else:
                     self._port(part, own).read(value)
-                is_input = self.description.variables[name].causality == "input"
-                out[column] = (value[0] - offset) / factor if is_input else factor * value[0] + offset
+                takes = self.description.variables[name].causality in ("input", "parameter")
+                out[column] = (value[0] - offset) / factor if takes else factor * value[0] + offset
 
     def _name(self, reference: int) -> str:
         return self._names[reference]

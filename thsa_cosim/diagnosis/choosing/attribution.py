@@ -56,6 +56,15 @@ class Round:
         whole = {id(s) for s in (self.accepted, *self.rivals, *self.forms)}
         return replace(self, scored=tuple(s if id(s) in whole else s.folded for s in self.scored))
 
+    def with_accepted(self, choice: Scored) -> "Round":
+        """The same with ``choice`` in place of the accepted one."""
+        old = self.accepted
+        if old is None or old.proposal is choice.proposal:
+            return self
+        proposals = tuple(choice.proposal if p is old.proposal else p for p in self.proposals)
+        scored = tuple(choice if s.proposal is old.proposal else s for s in self.scored)
+        return replace(self, proposals=proposals, scored=scored, accepted=choice)
+
     def probability(self, gain: float) -> float:
         """Probability that chance makes at least ``gain``."""
         return probability(gain, self.gains)
@@ -134,11 +143,13 @@ def attribute(
             choice = rounds[-1].accepted
             if choice is None:
                 break
-            accepted.append(choice)
-            current, reweighed = weights.weigh(choice.fit)
+            fit, reweighed = weights.weigh(choice.fit)
             if reweighed is None:
                 return None
-            current_held = reweighed
+            choice, fit, current_held = freed(bench, weights, choice, (fit, reweighed), say)
+            rounds[-1] = rounds[-1].with_accepted(choice)
+            accepted.append(choice)
+            current = fit
             offered = further_parts(choice.candidate, candidates)
         if offered is candidates:
             break
@@ -209,10 +220,6 @@ def _round(
         gains = largest_gains(selection.current, proposals, seed)
         limit = threshold(gains)
     choice, objections = selection.choose(scored, limit, not accepted, not whole)
-    if choice is not None and (free := freed(selection, choice)) is not None:
-        scored = [free if s.proposal is choice.proposal else s for s in scored]
-        proposals = [free.proposal if p is choice.proposal else p for p in proposals]
-        choice = free
     rivals: tuple[Scored, ...] = ()
     forms: tuple[Scored, ...] = ()
     if choice is not None and whole:

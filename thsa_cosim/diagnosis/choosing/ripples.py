@@ -9,11 +9,15 @@ from dataclasses import replace
 
 from thsa_cosim.diagnosis.choosing.gates import NEXT_SHARE, SIGMAS, SMALLEST_STRUCTURE, out_of_range
 from thsa_cosim.diagnosis.choosing.orders import Machine
-from thsa_cosim.diagnosis.choosing.score import Scored, with_all_free
+from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal
-from thsa_cosim.diagnosis.choosing.selection import Selection
-from thsa_cosim.diagnosis.fitting.fit import Fit
+from thsa_cosim.diagnosis.choosing.selection import Say
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, structure
+from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
+from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
+from thsa_cosim.signals import FloatArray
 
 
 def on_orders(proposals: Sequence[Proposal], machine: Machine, current: Fit) -> list[Proposal]:
@@ -33,15 +37,27 @@ def _on_order(proposal: Proposal, machine: Machine, current: Fit) -> Proposal:
     return replace(proposal, shapes=shapes, held=frozenset(held)) if held else proposal
 
 
-def freed(selection: Selection, choice: Scored) -> Scored | None:
-    """``choice`` with its order fitted, too, where that explains as much more as a further effect has to; else None."""
-    weights, held = selection.weights, choice.proposal.held
-    if not held or weights.left(choice.validate) < SMALLEST_STRUCTURE**2:
-        return None
-    selection.say(f"fitting {choice.candidate.name} with a free order")
-    one = with_all_free(selection.bench, choice, selection.current, selection.held)
-    trials = selection.bench.of("validate")
-    before, after = structure(trials, choice.validate), structure(trials, one.validate)
+def freed(
+    bench: Bench, weights: ChannelWeights, choice: Scored, found: tuple[Fit, FloatArray], say: Say
+) -> tuple[Scored, Fit, FloatArray]:
+    """``choice`` with its order fitted, too, where that explains as much as a further effect has to.
+
+    ``found``: the fit of the model with it and its held-out residuals (N,); those that count come back.
+    """
+    fit, held = found
+    if not choice.proposal.held or weights.left(held) < SMALLEST_STRUCTURE**2:
+        return choice, *found
+    say(f"fitting {choice.candidate.name} with a free order")
+    proposal = replace(choice.proposal, held=frozenset())
+    own = {u.name: u.spread for u in unknowns_of(proposal.candidate, proposal.shapes)}
+    members = [replace(u, spread=own.get(u.name, u.spread)) for u in fit.unknowns.members]
+    free = refine(bench, Unknowns(tuple(members)), fit.vector, steps=fit.steps)
+    validate = None if free is None else bench.residuals(free.unknowns, free.vector[None, :], "validate")[0]
+    if free is None or validate is None or out_of_range(free):
+        return choice, *found
+    trials = bench.of("validate")
+    before, after = structure(trials, held), structure(trials, validate)
     explains = before - after >= NEXT_SHARE * before
-    certain = consistency(block_gains(trials, choice.validate, one.validate)) >= SIGMAS
-    return one if explains and certain and not out_of_range(one.fit) else None
+    if not explains or consistency(block_gains(trials, held, validate)) < SIGMAS:
+        return choice, *found
+    return replace(choice, proposal=proposal, fit=free, validate=validate), free, validate

@@ -140,17 +140,6 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scor
     return _scored(bench, choice.proposal, best, current, held) or choice
 
 
-def with_all_free(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scored:
-    """The same from its optimum with the shapes fitted that it holds."""
-    proposal, fit = replace(choice.proposal, held=frozenset()), choice.fit
-    free = {u.name: u for u in unknowns_of(proposal.candidate, proposal.shapes)}
-    unknowns = Unknowns(
-        tuple(replace(u, spread=free[u.name].spread) if u.name in free else u for u in fit.unknowns.members)
-    )
-    found = refine(bench, unknowns, fit.vector, steps=fit.steps)
-    return choice if found is None else _scored(bench, proposal, found, current, held) or choice
-
-
 def extended_unknowns(declared: Unknowns, accepted: Sequence[Scored]) -> Unknowns:
     """The declared parameters and those of the accepted effects, the latter from their own starts."""
     members = [u for s in accepted for u in unknowns_of(s.candidate, s.proposal.shapes, s.proposal.held)]

@@ -112,13 +112,18 @@ def columns(
 ) -> tuple[FloatArray, FloatArray]:
     """Jacobian columns (N, len(which)) per scale by one-sided differences, and the steps that serve next time.
 
-    A column whose response was far from ``response`` (default: RESPONSE, or SHARE of the residuals' norm) is taken
-    again with a better step; one that cannot be simulated is zero.
+    A column whose response was far from ``response`` (default: RESPONSE as weighed, or SHARE of the residuals' norm) is
+    taken again with a better step; one that cannot be simulated is zero.
     """
-    aim = max(RESPONSE, SHARE * float(np.linalg.norm(centre))) if response is None else response
+    aim = _response(bench, centre) if response is None else response
     settings = DifferenceSettings(aim, 0.0, smallest=SMALLEST, largest=LARGEST, repeats=2)
     asked = difference_columns(vector, centre, steps, unknowns.box, settings, which)
     return answer(asked, lambda vectors: bench.residuals(unknowns, vectors, "fit"))
+
+
+def _response(bench: Bench, residual: FloatArray) -> float:
+    """By how much a difference step is to move the residuals, as they are weighed."""
+    return max(RESPONSE * bench.level("fit"), SHARE * float(np.linalg.norm(residual)))
 
 
 def refine(
@@ -161,7 +166,7 @@ def refine(
                 break
             if response is not None:
                 break
-            response, stale = 5.0 * max(RESPONSE, SHARE * float(np.linalg.norm(residual))), True
+            response, stale = 5.0 * _response(bench, residual), True
             continue
         gained = cost - better.cost
         vector, residual, cost = better.vector, better.residual, better.cost

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from thsa_cosim.export.causal import CausalModel, column
 from thsa_cosim.export.emit import statements
 from thsa_cosim.export.graph import Graph
+from thsa_cosim.export.model import CausalModel, column
 from thsa_cosim.export.solve import HOMOTOPY, Block
 
 STEPS = 20  # of the way from the simplified to the actual initial system

@@ -11,9 +11,10 @@ from typing import Any
 from thsa_cosim.modelica import builtin, tables
 from thsa_cosim.modelica.arrays import Record, Value, each, fill, shape
 from thsa_cosim.modelica.evaluate import Evaluator
-from thsa_cosim.modelica.scope import BUILTIN_TYPES, Element, Scope, resolved
+from thsa_cosim.modelica.redeclaration import resolved
+from thsa_cosim.modelica.scope import BUILTIN_TYPES, Element, Scope
 from thsa_cosim.modelica.statements import UNSET, Statements, UnknownStepsError
-from thsa_cosim.modelica.syntax import Component, Syntax
+from thsa_cosim.modelica.syntax import Component, Equation, Syntax
 from thsa_cosim.modelica.terms import Enumeration
 
 
@@ -246,10 +247,25 @@ class _Run:
             env = runner.run(statements, self.env)
         finally:
             self.caller.scope.world.__dict__["calls"].pop()
+        for name in self.outputs:
+            if name in runner.partly and not any(_asserts(s) for s in statements):
+                what = f"{self.target.qualified}() gives {name} no value in one of its branches"
+                self.caller.warn(
+                    self.where, f"{what}; that of another branch is taken, Modelica leaves it open."
+                )
         results = tuple(env[name] for name in self.outputs)
         if not results:
             return ()
         return results[0] if len(results) == 1 else results
+
+
+def _asserts(statement: Any) -> bool:
+    """Whether a statement, or one inside it, is an assertion: what follows a failed one does not matter."""
+    if isinstance(statement, Equation) and statement.op == "call":
+        return bool(statement.args[0].args[0] == "assert")
+    if isinstance(statement, Syntax) or not isinstance(statement, tuple):
+        return False
+    return any(_asserts(part) for part in statement)
 
 
 def _names_in(expression: Any) -> set[str]:

@@ -132,10 +132,10 @@ def attribute(
                     selection,
                     left,
                     scan(current),
-                    machine,
                     seed + len(rounds),
                     accepted,
                     offered is candidates,
+                    machine,
                 ).folded
             )
             if len(rounds) > 1:  # which effects are alike is told by the responses of the first
@@ -201,10 +201,10 @@ def _round(
     selection: Selection,
     offered: Sequence[Candidate],
     waves: Mapping[str, Sequence[float]],
-    machine: Machine,
     seed: int,
     accepted: Sequence[Scored],
     whole: bool,
+    machine: Machine = NO_MACHINE,
 ) -> Round:
     """Screen what is ``offered`` (``whole``: all effects, else parts of the last one), refine the best, choose one."""
     proposals = on_orders(

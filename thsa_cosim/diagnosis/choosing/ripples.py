@@ -22,7 +22,7 @@ from thsa_cosim.signals import FloatArray
 
 def on_orders(proposals: Sequence[Proposal], machine: Machine, current: Fit) -> list[Proposal]:
     """``proposals`` whose wave number is an order of the machine hold it; what is in the model already stays."""
-    return [_on_order(p, machine, current) for p in proposals]
+    return [_on_order(p, machine, current) for p in proposals] if machine.turns else list(proposals)
 
 
 def _on_order(proposal: Proposal, machine: Machine, current: Fit) -> Proposal:

@@ -1,12 +1,7 @@
 """The unknowns of a fit: declared parameters (with what the drawing says of them) and an effect's parameters."""
 
-<<<<<<< HEAD
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-=======
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
->>>>>>> main
 
 import numpy as np
 
@@ -101,19 +96,10 @@ class Unknowns:
         return dict(zip(self.names, vector.tolist(), strict=True))
 
 
-<<<<<<< HEAD
 #: Relative spread of a shape that is known: an integer order of a machine.
 EXACT = 1e-6
 
 
-def unknowns_of(
-    candidate: Candidate, shapes: Mapping[str, float], held: Collection[str] = ()
-) -> tuple[Unknown, ...]:
-    """The candidate's parameters as unknowns: coefficients at neutral, shapes at the given starts.
-
-    ``held``: names of shapes that are known there.
-    """
-=======
 def declared_unknowns_of(effects: Sequence[DeclaredEffect]) -> tuple[Unknown, ...]:
     """The parameters of known effects as declared unknowns, of which only the start is known; each variable once."""
     found = {
@@ -124,9 +110,13 @@ def declared_unknowns_of(effects: Sequence[DeclaredEffect]) -> tuple[Unknown, ..
     return tuple(found.values())
 
 
-def unknowns_of(candidate: Candidate, shapes: Mapping[str, float]) -> tuple[Unknown, ...]:
-    """The candidate's parameters as unknowns: coefficients at neutral, shapes at the given starts."""
->>>>>>> main
+def unknowns_of(
+    candidate: Candidate, shapes: Mapping[str, float], held: Collection[str] = ()
+) -> tuple[Unknown, ...]:
+    """The candidate's parameters as unknowns: coefficients at neutral, shapes at the given starts.
+
+    ``held``: names of shapes that are known there.
+    """
     made = []
     for p in candidate.parameters:
         shape = p.role == "shape"

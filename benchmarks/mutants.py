@@ -1,15 +1,20 @@
 """Mutation testing of the decisions: small changes of the code, and which of them its tests notice.
 
-    python benchmarks/mutants.py [--children 2] [PATTERN ...]
+    python benchmarks/mutants.py [--children 2] [--sample N] [PATTERN ...]
 
 Runs mutmut as `pyproject.toml` says and prints per module how many mutants were noticed, then those that survived.
-Leaves with 1 if less than 90 % are noticed. PATTERN restricts it: "thsa_cosim.diagnosis.choosing.gates*".
+Leaves with 1 if less than 90 % are noticed. PATTERN restricts it: "thsa_cosim.diagnosis.choosing.gates*". All take
+hours; ``--sample 25`` tries 25 of every module, drawn by chance, and prints what that says about all of them.
+What is known from a run before, of code and tests that are the same, is kept: without PATTERN or sample a run goes on.
 """
 
 from __future__ import annotations
 
 import argparse
+import fnmatch
+import math
 import os
+import random
 import subprocess
 import sys
 from collections import Counter
@@ -19,44 +24,114 @@ ROOT = Path(__file__).resolve().parents[1]
 GOAL = 0.9
 #: What mutmut says of a mutant that a test noticed; "not checked" ones are left out.
 NOTICED = ("killed", "timeout", "segfault", "suspicious")
+UNKNOWN = "not checked"
+#: A small module that makes mutmut write the mutants of all.
+FIRST = "thsa_cosim.study.digest*"
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--children", type=int, default=2, help="tests that run at the same time")
+    parser.add_argument(
+        "--sample", type=int, metavar="N", help="try N mutants of every module, drawn by chance"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="of the sample")
     parser.add_argument("patterns", nargs="*", metavar="PATTERN")
     given = parser.parse_args()
-    mutmut = Path(sys.executable).with_name("mutmut")
+    chosen = given.patterns
+    if given.sample:
+        if not states():
+            mutmut("run", "--max-children", str(given.children), FIRST)  # which makes all mutants
+        chosen = sample(
+            [name for name in states() if matches(name, given.patterns)], given.sample, given.seed
+        )
+    mutmut("run", "--max-children", str(given.children), *chosen)
+    known = states()
+    return report(known, sizes=Counter(map(module, known)), tried=chosen if given.sample else None)
+
+
+def mutmut(*arguments: str) -> str:
+    """Run mutmut; what it printed."""
+    program = Path(sys.executable).with_name("mutmut")
     environment = {
         k: v for k, v in os.environ.items() if k != "PYTHONPATH"
     }  # the mutated copy is to be imported
-    run = [mutmut, "run", "--max-children", str(given.children), *given.patterns]
-    subprocess.run(run, cwd=ROOT, env=environment, check=True, stdout=subprocess.DEVNULL)
-    results = [mutmut, "results", "--all", "true"]
-    said = subprocess.run(
-        results, cwd=ROOT, env=environment, check=True, capture_output=True, text=True
-    ).stdout
-    return report([line.strip() for line in said.splitlines() if ": " in line])
+    done = subprocess.run(
+        [program, *arguments], cwd=ROOT, env=environment, check=True, stdout=subprocess.PIPE, text=True
+    )
+    return done.stdout
 
 
-def report(lines: list[str]) -> int:
-    """Print what was noticed per module and what survived; 1 below the goal."""
-    counts: dict[str, Counter[str]] = {}
-    survived = []
-    for line in lines:
-        name, _, state = line.rpartition(": ")
-        if state == "not checked":
-            continue
-        noticed = state in NOTICED
-        counts.setdefault(name.split(".x")[0], Counter())["noticed" if noticed else "survived"] += 1
-        survived += [] if noticed else [f"{name}: {state}"]
-    total: Counter[str] = sum(counts.values(), Counter())
-    for module, own in [*sorted(counts.items()), ("all", total)]:
+def states() -> dict[str, str]:
+    """What is known of every mutant, by its name; empty before a first run."""
+    if not (ROOT / "mutants").is_dir():
+        return {}
+    said = mutmut("results", "--all", "true")
+    rows = (line.strip().rpartition(": ") for line in said.splitlines() if ": " in line)
+    return {name: state for name, _, state in rows}
+
+
+def module(name: str) -> str:
+    """The module of a mutant."""
+    return name.split(".x")[0]
+
+
+def matches(name: str, patterns: list[str]) -> bool:
+    """Whether a mutant is meant; without patterns each is."""
+    return not patterns or any(fnmatch.fnmatch(name, pattern) for pattern in patterns)
+
+
+def sample(names: list[str], count: int, seed: int) -> list[str]:
+    """``count`` of every module, or all of a smaller one."""
+    chance = random.Random(seed)
+    by_module: dict[str, list[str]] = {}
+    for name in names:
+        by_module.setdefault(module(name), []).append(name)
+    return [n for own in by_module.values() for n in chance.sample(own, min(count, len(own)))]
+
+
+def report(known: dict[str, str], sizes: Counter[str], tried: list[str] | None) -> int:
+    """Print what was noticed per module and what survived; 1 below the goal.
+
+    ``tried``: a sample; then the share of all is each module's share times its size, with its standard error.
+    """
+    counted = {
+        name: state for name, state in known.items() if state != UNKNOWN and (tried is None or name in tried)
+    }
+    noticed = Counter(module(name) for name, state in counted.items() if state in NOTICED)
+    total = Counter(map(module, counted))
+    for name in sorted(total):
+        _print(name, noticed[name], total[name], sizes[name])
+    if not total:
+        return 1
+    _print("all", noticed.total(), total.total(), sum(sizes[name] for name in total))
+    share = noticed.total() / total.total()
+    if tried is not None:
+        share, error = estimate(noticed, total, sizes)
         print(
-            f"{module:50s} {own['noticed']:5d} of {own.total():5d}  {100 * own['noticed'] / (own.total() or 1):5.1f} %"
+            f"of all mutants of these modules {100 * share:.1f} +- {100 * error:.1f} % (one standard error)"
         )
-    print("\n".join(survived))
-    return 0 if total and total["noticed"] >= GOAL * total.total() else 1
+    print("\n".join(f"{name}: {state}" for name, state in counted.items() if state not in NOTICED))
+    return 0 if share >= GOAL else 1
+
+
+def estimate(noticed: Counter[str], total: Counter[str], sizes: Counter[str]) -> tuple[float, float]:
+    """Share of all mutants of the sampled modules that is noticed, and its error (drawn without replacement)."""
+    whole = sum(sizes[name] for name in total)
+    share = sum(sizes[name] * noticed[name] / n for name, n in total.items()) / whole
+    variance = sum(
+        (sizes[name] / whole) ** 2
+        * (noticed[name] / n)
+        * (1.0 - noticed[name] / n)
+        / max(n - 1, 1)
+        * (1.0 - n / sizes[name])
+        for name, n in total.items()
+    )
+    return share, math.sqrt(variance)
+
+
+def _print(name: str, noticed: int, tried: int, size: int) -> None:
+    print(f"{name:50s} {noticed:5d} of {tried:5d} tried of {size:5d}  {100 * noticed / tried:5.1f} %")
 
 
 if __name__ == "__main__":

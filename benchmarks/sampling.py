@@ -42,7 +42,7 @@ def measured(sampling: float | None, delay: float, step: float | None) -> Freque
     how = "continuous" if sampling is None else "sampled"
     controller = Part("controller", FMUS / "Controller.fmu", how, sampling, delay)
     plant = Part("plant", FMUS / "Plant.fmu", "continuous" if step is None else "coupled", step)
-    path = assembled("sampling", [controller, plant], WIRES, CONNECTORS)
+    path = assembled("sampling", [controller, plant], WIRES, CONNECTORS).path
     with SystemPlant.open(path) as opened:
         return loop_response(
             opened,

@@ -32,6 +32,8 @@ class ParameterSet:
     values: Mapping[str, float]
     units: Mapping[str, str] = field(default_factory=dict)
     description: str = ""
+    others: Mapping[str, str] = field(default_factory=dict)
+    """Types of the values that are no numbers (String, Enumeration, Binary), by name."""
 
 
 def write_ssv(path: Path, parameters: ParameterSet) -> None:
@@ -95,35 +97,47 @@ def read_ssv(path: Path) -> ParameterSet:
 
 def parse_ssv(root: ET.Element, path: Path | str) -> ParameterSet:
     """Read a ParameterSet element; ``path`` is what messages name. Raises as :func:`read_ssv` does."""
+    parameters = parse_parameter_set(root, path)
+    for name, kind in parameters.others.items():
+        raise ParameterError(f"{path}: parameter {name!r} holds {kind}; only numbers can be set.")
+    for name, unit in parameters.units.items():
+        _known_unit(path, name, unit)
+    return parameters
+
+
+def parse_parameter_set(root: ET.Element, path: Path | str) -> ParameterSet:
+    """Read a ParameterSet element with all that it holds: units as they stand, what is no number as ``others``."""
     if root.tag != f"{{{SSV}}}ParameterSet":
         raise ParameterError(f"{path}: holds {root.tag!r}, not the ParameterSet of an SSP 1.0 .ssv file.")
     values: dict[str, float] = {}
     units: dict[str, str] = {}
+    others: dict[str, str] = {}
     for parameter in root.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
         name = parameter.get("name", "")
-        if name in values:
+        if name in values or name in others:
             raise ParameterError(f"{path}: parameter {name!r} is set twice; remove one.")
-        values[name] = _number(path, name, parameter)
-        real = next((e for kind in FLOATS for e in parameter.iterfind(f"{{{SSV}}}{kind}")), None)
-        if real is not None and real.get("unit"):
-            units[name] = _known_unit(path, name, real.get("unit", ""))
-    return ParameterSet(root.get("name", ""), values, units, root.get("description", ""))
+        child = next((e for e in parameter if e.tag.startswith(f"{{{SSV}}}")), None)
+        kind = "nothing" if child is None else child.tag.removeprefix(f"{{{SSV}}}")
+        if child is None or kind not in _NUMBERS:
+            others[name] = kind
+            continue
+        if kind not in FLOATS or len(child.get("value", "").split()) < 2:
+            values[name] = _number(path, name, kind, child.get("value", "").strip())
+        else:
+            others[name] = "an array"
+        if kind in FLOATS and child.get("unit"):
+            units[name] = child.get("unit", "")
+    return ParameterSet(root.get("name", ""), values, units, root.get("description", ""), others)
 
 
-def _known_unit(path: Path | str, name: str, unit: str) -> str:
+def _known_unit(path: Path | str, name: str, unit: str) -> None:
     try:
         base_exponents(unit)
     except UnitError as error:
         raise UnitError(f"{path}: parameter {name!r}: {error}") from None
-    return unit
 
 
-def _number(path: Path | str, name: str, parameter: ET.Element) -> float:
-    child = next(iter(parameter), None)
-    kind = "nothing" if child is None else child.tag.removeprefix(f"{{{SSV}}}")
-    if child is None or kind not in _NUMBERS:
-        raise ParameterError(f"{path}: parameter {name!r} holds {kind}; only numbers can be set.")
-    text = child.get("value", "").strip()
+def _number(path: Path | str, name: str, kind: str, text: str) -> float:
     if kind == "Boolean" and text in ("true", "false"):
         return float(text == "true")
     try:

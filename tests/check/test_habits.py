@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmu_sources.build import habits2
+from fmu_sources.build import HABITS2, habits2, library, write_fmu
 
 from thsa_cosim.batch import Experiment, Job, LocalRunner
-from thsa_cosim.check import Finding, Verdict, check_fmu
+from thsa_cosim.check import Finding, Verdict, check_fmu, trials
 from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu import read_description
 from thsa_cosim.fmu.probe import missing_binary
@@ -67,6 +67,47 @@ def test_parameters_that_start_elsewhere_than_declared_are_named() -> None:
     found = lines(habits2("OTHER_START"))
     assert "it starts with others" in found["declared values"].text
     assert "first values" not in found
+
+
+def test_a_licence_that_is_lost_before_the_stop_time_fails(tmp_path: Path) -> None:
+    """Two seconds run; the FMU says that it is meant for five."""
+    xml = HABITS2.replace("{flags}", "").replace('stopTime="1"', 'stopTime="5"')
+    path = write_fmu(tmp_path / "licence.fmu", xml, library("habits2.c", "LICENCE=2.0"), "habits2")
+    found = lines(path)
+    assert found["runs"].verdict is Verdict.FAILED
+    assert "the licence was lost; with its inputs at rest it fails, too" in found["runs"].text
+
+
+def test_a_duration_that_nobody_declared_is_said(tmp_path: Path) -> None:
+    xml = HABITS2.replace("{flags}", "").replace('stopTime="1" ', "")
+    path = write_fmu(tmp_path / "endless.fmu", xml, library("habits2.c"), "habits2")
+    assert "1 s in 100 steps (it declares no stop time: see --duration)" in lines(path)["runs"].text
+
+
+def test_inputs_that_ask_too_much_are_told_from_an_fmu_that_fails() -> None:
+    found = lines(habits2("NAN_ABOVE=0.5"))
+    assert found["runs"].verdict is Verdict.WARNING
+    assert "inputs at their start values" in found["runs"].text
+    assert "say how far they run (--input NAME=VALUE)" in found["runs"].text
+
+
+def test_a_jump_between_two_communication_points_is_no_error_of_the_step() -> None:
+    found = lines(habits2("JUMPS"))
+    assert found["communication step"].values["change"] < 0.05
+    assert found["communication step"].verdict is not Verdict.FAILED
+
+
+def test_a_slow_fmu_is_tried_over_its_begin(monkeypatch: pytest.MonkeyPatch) -> None:
+    """100 steps take 0.5 s at least, where a run may take 0.2 s, or is killed."""
+    monkeypatch.setattr(trials, "LONGEST_RUN", 0.2)
+    slow = habits2("SLOW=5000")
+    found = lines(slow)
+    assert found["runs"].verdict is Verdict.WARNING
+    assert "so what follows is tried over" in found["runs"].text
+    report = check_fmu(slow, deadline_s=0.4, cycles=2)
+    runs = next(f for f in report.findings if f.name == "runs")
+    assert "all of it takes more than 0.4 s (see --deadline)" in runs.text
+    assert runs.verdict is Verdict.WARNING
 
 
 def test_where_a_description_lies_too_deep_is_said(tmp_path: Path) -> None:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fmu_sources import build
+from fmu_sources.build import HABITS2
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_scenario import write_fmu
@@ -192,6 +194,24 @@ def test_a_unit_with_a_slash_is_the_unit_and_the_name_before_it_is_the_variable(
     assert columns.get("w_m", {}).get("column") == "J1_w [rad/s]" or left == {"J1_w [rad/s]": "rad/s"}
     target.write_text(draft.text)
     assert "w_cmd" in load(target).inputs
+
+
+def test_columns_named_as_the_outputs_with_their_unit_are_those_outputs(tmp_path: Path) -> None:
+    """J1_w [rad/s] for J1_w in rad/s, next to a J2_w."""
+    unit = '<UnitDefinitions><Unit name="rad/s"><BaseUnit s="-1" rad="1"/></Unit></UnitDefinitions>'
+    xml = HABITS2.replace("{flags}", "").replace(" <DefaultExperiment", f" {unit}\n <DefaultExperiment")
+    for old, new in (("y", "J1_w"), ("u", "tau_1"), ("tau", "J2_w")):
+        xml = xml.replace(f'name="{old}"', f'name="{new}"')
+    xml = xml.replace("<Real/>", '<Real unit="rad/s"/>').replace(
+        'valueReference="2" causality="parameter" variability="fixed"><Real start="0.1"/>',
+        'valueReference="2" causality="output"><Real unit="rad/s"/>',
+    )
+    fmu = build.write_fmu(tmp_path / "shafts.fmu", xml, build.library("habits2.c"), "habits2")
+    file = csv(tmp_path / "run.csv", "time [s],J2_w [rad/s],tau_1,J1_w [rad/s]")
+    draft = draft_scenario(read_description(fmu), [file], tmp_path / "s.toml")
+    assert mapping(draft.text) == {"J1_w": "J1_w [rad/s]", "J2_w": "J2_w [rad/s]", "tau_1": "tau_1"}
+    assert draft.unmatched_columns == ()
+    assert draft.unmatched_outputs == ()
 
 
 def test_units_of_the_file_count_and_missing_ones_are_assumed(small: FmuDescription, tmp_path: Path) -> None:

@@ -226,6 +226,18 @@ def test_fmi3_discard_terminate_and_short_steps(backend: str) -> None:
             assert caught.value.status is status
 
 
+@pytest.mark.parametrize("backend", ["compiled", "python"])
+def test_a_step_that_is_done_in_parts_is_gone_on_with(backend: str) -> None:
+    """fmi2Discard with the last successful time, in every step; the inputs are those of the whole step."""
+    with (
+        Plant.open(build.habits2(), backend=backend) as whole,
+        Plant.open(build.habits2("PARTS"), backend=backend) as parts,
+    ):
+        wanted = whole.run({"tau": TAU}, wave(), ["y"], TIME)["y"]
+        found = parts.run({"tau": TAU}, wave(), ["y"], TIME)["y"]
+    np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-14)
+
+
 def test_wrong_guid_is_a_load_error_with_the_fmus_own_words() -> None:
     with (
         Plant.open(build.lag2(guid="{other}")) as plant,

@@ -92,3 +92,16 @@ def test_a_library_beside_the_fmus_own_is_found(tmp_path: Path) -> None:
     helper.unlink()
     with Plant.open(path) as plant:
         plant.run({}, WAVE, ["y"], TIME)
+
+
+def test_a_negated_alias_of_fmi1_has_the_other_sign() -> None:
+    time = np.linspace(0.0, 1.0, 51)
+    step = Signals(time, {"u": np.ones(51)})
+    with Plant.open(build.lag1()) as plant:
+        found = plant.run({}, step, ["y", "minus_y"], time)
+        assert found["y"][-1] > 0.9
+        assert np.array_equal(found["minus_y"], -found["y"])
+    with Plant.open(build.exchange1()) as plant:
+        found = plant.run({"minus_k": -3.0}, step, ["y", "minus_y"], time)
+        assert found["y"][-1] == pytest.approx(3.0, rel=1e-3)
+        assert np.array_equal(found["minus_y"], -found["y"])

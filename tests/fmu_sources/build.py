@@ -170,6 +170,34 @@ LAG3 = """<?xml version="1.0" encoding="UTF-8"?>
 </fmiModelDescription>
 """
 
+CLOCK3 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="Clock3" instantiationToken="{clock3}" generationTool="a tool">
+ <ModelExchange modelIdentifier="clock3"/>
+ <CoSimulation modelIdentifier="clock3" canHandleVariableCommunicationStepSize="true" hasEventMode="true"
+   mightReturnEarlyFromDoStep="true"/>
+ <DefaultExperiment startTime="0" stopTime="1" tolerance="1e-6" stepSize="0.01"/>
+ <ModelVariables>
+  <Float64 name="x" valueReference="1" causality="output" initial="exact" start="0"/>
+  <Float64 name="s" valueReference="2" causality="output" variability="discrete" initial="exact" start="0"/>
+  <Float64 name="u" valueReference="3" causality="input" start="0"/>
+  <Float64 name="gain" valueReference="4" causality="parameter" variability="fixed" start="1"/>
+  <Float64 name="der(x)" valueReference="5" derivative="1"/>
+  <Int32 name="n" valueReference="6" causality="output" variability="discrete"/>
+  <Boolean name="turn" valueReference="7" causality="input" variability="discrete" start="false"/>
+  <UInt64 name="order" valueReference="8" causality="structuralParameter" variability="fixed" start="1"/>
+  <Clock name="sample" valueReference="9" causality="input" intervalVariability="constant" intervalDecimal="0.2"
+    shiftDecimal="0.1"/>
+  <Clock name="wait" valueReference="10" causality="input" intervalVariability="countdown"/>
+  <Int32 name="early" valueReference="11" causality="output" variability="discrete"/>
+ </ModelVariables>
+ <ModelStructure>
+  <Output valueReference="1"/><Output valueReference="2"/><Output valueReference="6"/><Output valueReference="11"/>
+  <ContinuousStateDerivative valueReference="5"/><InitialUnknown valueReference="5"/>
+  <InitialUnknown valueReference="6"/><InitialUnknown valueReference="11"/>
+ </ModelStructure>
+</fmiModelDescription>
+"""
+
 EVENTS2 = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="Ball" guid="{events}" numberOfEventIndicators="1">
  <ModelExchange modelIdentifier="events2"/>
@@ -210,6 +238,7 @@ LAG1 = """<?xml version="1.0" encoding="UTF-8"?>
  <ModelVariables>
   <ScalarVariable name="tau" valueReference="1" variability="parameter"><Real start="0.1"/></ScalarVariable>
   <ScalarVariable name="y" valueReference="2" causality="output"><Real/></ScalarVariable>
+  <ScalarVariable name="minus_y" valueReference="2" causality="output" alias="negatedAlias"><Real/></ScalarVariable>
   <ScalarVariable name="u" valueReference="3" causality="input"><Real start="0"/></ScalarVariable>
   <ScalarVariable name="steps" valueReference="1" causality="output" variability="discrete"><Integer/>
   </ScalarVariable>
@@ -230,6 +259,9 @@ EXCHANGE1 = """<?xml version="1.0" encoding="UTF-8"?>
   <ScalarVariable name="u" valueReference="2" causality="input"><Real start="0"/></ScalarVariable>
   <ScalarVariable name="at" valueReference="3" variability="parameter"><Real start="1e9"/></ScalarVariable>
   <ScalarVariable name="y" valueReference="4" causality="output"><Real/></ScalarVariable>
+  <ScalarVariable name="minus_y" valueReference="4" alias="negatedAlias"><Real/></ScalarVariable>
+  <ScalarVariable name="minus_k" valueReference="1" variability="parameter" alias="negatedAlias"><Real start="-1"/>
+  </ScalarVariable>
   <ScalarVariable name="h" valueReference="5" causality="output"><Real unit="m" displayUnit="mm"/></ScalarVariable>
   <ScalarVariable name="v" valueReference="6"><Real/></ScalarVariable>
   <ScalarVariable name="bounces" valueReference="0" causality="output" variability="discrete"><Integer/>
@@ -363,6 +395,12 @@ def lag3(*, updates: bool = True) -> Path:
     name = "lag3" if updates else "lag3_held"
     xml = LAG3.format(updates=str(updates).lower())
     return write_fmu(_folder() / f"{name}.fmu", xml, library("lag3.c"), "lag3")
+
+
+@cache
+def clock3() -> Path:
+    """The sampled integrator of clock3.c, FMI 3.0: clocks that tick by time, Event Mode in Co-Simulation."""
+    return write_fmu(_folder() / "clock3.fmu", CLOCK3, library("clock3.c"), "clock3")
 
 
 @cache

@@ -3,15 +3,23 @@
  *     tau dy/dt = gain u - y
  *
  * ONCE: one instance per process, and never another. FIXED_STEP: steps of 0.01 s only. FIRST_VALUE=x: the output is
- * x before the first step. OTHER_START: the parameters start elsewhere than the model description says.
+ * x before the first step. OTHER_START: the parameters start elsewhere than the model description says. PARTS: no step is
+ * done further than 4 ms; what is left is for the next call. LICENCE=t: lost after so many seconds. JUMPS: y jumps by 1
+ * after 0.2345 s. EULER: one explicit step per communication step. SLOW=t: each step takes so many microseconds.
+ * NAN_ABOVE=u: y is no number where the input is above u. ALONE: no other instance of any such FMU lives in the process.
+ * SETUP_FORGETS: fmi2SetupExperiment overwrites start values.
  */
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include "fmi2Functions.h"
 
 typedef struct {
     double y, u, tau, gain;
     int steps;
+    double time;
     const fmi2CallbackFunctions* callbacks;
 } Model;
 
@@ -20,6 +28,7 @@ static void start(Model* m) {
     m->tau = 0.1;
     m->gain = 1.0;
     m->steps = 0;
+    m->time = 0.0;
 #ifdef OTHER_START
     m->gain = 7.0;
 #endif
@@ -42,16 +51,31 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         return NULL;
     }
 #endif
+#ifdef ALONE
+    char here[32];
+    const char* lives = getenv("HABITS_LIVES"); /* one environment for all libraries of a process */
+    snprintf(here, sizeof here, "%d", (int)getpid());
+    if (lives && !strcmp(lives, here)) return NULL;
+    setenv("HABITS_LIVES", here, 1);
+#endif
     Model* m = callbacks->allocateMemory(1, sizeof(Model));
     m->callbacks = callbacks;
     start(m);
     return m;
 }
-void fmi2FreeInstance(fmi2Component c) { ((Model*)c)->callbacks->freeMemory(c); }
+void fmi2FreeInstance(fmi2Component c) {
+#ifdef ALONE
+    unsetenv("HABITS_LIVES");
+#endif
+    ((Model*)c)->callbacks->freeMemory(c);
+}
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerant, fmi2Real tolerance, fmi2Real t0,
                                fmi2Boolean stops, fmi2Real stop) {
     (void)c, (void)tolerant, (void)tolerance, (void)t0, (void)stops, (void)stop;
+#ifdef SETUP_FORGETS
+    start(c);
+#endif
     return fmi2OK;
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { (void)c; return fmi2OK; }
@@ -87,15 +111,46 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
 #ifdef FIXED_STEP
     if (fabs(h - 0.01) > 1e-9) return fmi2Error;
 #endif
+#ifdef SLOW
+    usleep(SLOW);
+#endif
+#ifdef LICENCE
+    if (t + h > LICENCE) {
+        m->callbacks->logger(NULL, "habits", fmi2Error, "logStatusError", "the licence was lost");
+        return fmi2Error;
+    }
+#endif
+#ifdef PARTS
+    if (fabs(t - m->time) > 1e-9) return fmi2Error;
+    int whole = h <= 0.004 + 1e-12;
+    h = whole ? h : 0.004;
+    m->time += h;
+#endif
+#ifdef JUMPS
+    if (t < 0.2345 && t + h >= 0.2345) m->y += 1.0;
+#endif
+#ifdef NAN_ABOVE
+    if (m->u > NAN_ABOVE) m->y = NAN;
+#endif
+#ifdef EULER
+    m->y += (m->gain * m->u - m->y) * h / m->tau;
+#else
     m->y += (m->gain * m->u - m->y) * (1.0 - exp(-h / m->tau));
+#endif
     m->steps++;
+#ifdef PARTS
+    if (!whole) return fmi2Discard;
+#endif
     return fmi2OK;
 }
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real* value) {
-    (void)c, (void)kind, (void)value;
-    return fmi2Discard;
+    if (kind != fmi2LastSuccessfulTime) return fmi2Discard;
+    *value = ((Model*)c)->time;
+    return fmi2OK;
 }
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean* value) {
-    (void)c, (void)kind, (void)value;
-    return fmi2Discard;
+    (void)c;
+    if (kind != fmi2Terminated) return fmi2Discard;
+    *value = fmi2False;
+    return fmi2OK;
 }

@@ -122,13 +122,13 @@ def test_a_homotopy_makes_no_difference_while_the_model_runs(tmp_path: Path) -> 
         ("operator record V Real x; encapsulated operator function '+' input V a; input V b; output V c; "
          "algorithm c.x := a.x; end '+'; end V; model M V a(x=1); V b(x=2); V c = a + b; end M;",
          r"the operator \+ on the record V is a limit"),
-        ("model M parameter Real t0(fixed=false); discrete Real y(start=0); initial equation t0 = time; "
-         "equation when sample(t0, 0.1) then y = time; end when; end M;",
-         r"a sample\(\) whose times the initial equations determine"),
+        ("model M Real x(start=1, fixed=true); discrete Real y(start=0); equation der(x) = -x; "
+         "when sample(0, x) then y = time; end when; end M;",
+         r"the times of a sample\(\) have to be parameters, but depend on x"),
         ("model M parameter Real m = 0; Real x(start=1, fixed=true); Real y; equation der(x) = -x; m*y = x; end M;",
          "singular with the parameters as they are: y cannot be solved from"),
     ],
-    ids=["several solutions", "types", "operator record", "sample from the start", "zero coefficient"],
+    ids=["several solutions", "types", "operator record", "sample at a variable pace", "zero coefficient"],
 )  # fmt: skip
 def test_what_would_be_wrong_is_refused_by_name(tmp_path: Path, source: str, said: str) -> None:
     file = tmp_path / "M.mo"

@@ -13,7 +13,9 @@ from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu.description import DefaultExperiment
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.system import SystemPlant, read_description
-from thsa_cosim.system.assemble import Part, Wire, assemble
+from thsa_cosim.system.assemble import Part, Wire, assemble, assembled
+from thsa_cosim.system.description import SystemDescription
+from thsa_cosim.system.structure import System
 from thsa_cosim.system.write import write_ssp
 
 FMUS = Path(__file__).parents[2] / "fmus"
@@ -124,6 +126,28 @@ def test_a_written_system_is_read_back_and_written_the_same(tmp_path: Path) -> N
     assert twin.read_bytes() == path.read_bytes()
 
 
+def test_what_is_said_of_a_system_as_it_is_written_is_what_its_archive_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    slow = Part("slow", build.lag3(), "sampled", 0.01, 0.005, {"k": 3.0})
+    wires = [RING[0], replace(RING[1], disturbance="d")]
+    described = assembled("ring", [Part("fast", build.lag2()), slow], wires, {"y": ["slow.y"]})
+    again = read_description(described.path)
+    assert described.path.parent.parent == tmp_path / "thsa-cosim" / "systems"
+    for own in (
+        "sha256",
+        "variables",
+        "pins",
+        "default_experiment",
+        "capabilities",
+        "states",
+        "tool",
+        "model_name",
+    ):
+        assert getattr(again, own) == getattr(described, own), own
+
+
 def test_fmpy_reads_and_runs_what_we_write(tmp_path: Path) -> None:
     from fmpy.ssp.simulation import simulate_ssp
 
@@ -146,6 +170,154 @@ def test_fmpy_reads_and_runs_what_we_write(tmp_path: Path) -> None:
     assert np.max(np.abs(theirs - ours)) < 0.03 * np.max(np.abs(ours))
 
 
+def described(path: Path) -> System:
+    description = read_description(path)
+    assert isinstance(description, SystemDescription)
+    return description.system
+
+
+def wired(path: Path) -> tuple[object, ...]:
+    system = described(path)
+    starts = {c.name: dict(c.start) for c in system.components}
+    return starts, set(system.connections), set(system.connectors)
+
+
+def test_start_and_end_of_a_connection_say_nothing_of_its_direction(tmp_path: Path) -> None:
+    """SSP 1.0, 5.3.3.1: the connectors' kinds do; editors write a connection as it was drawn."""
+    turned = NESTED
+    for one, other in (
+        ('startElement="fast" startConnector="y"', 'endElement="inner" endConnector="u"'),
+        ('startElement="slow" startConnector="y"', 'endConnector="y"'),
+        ('startConnector="u"', 'endElement="slow" endConnector="u"'),
+        ('startElement="inner" startConnector="y"', 'endConnector="shown"'),
+    ):
+        swapped = f"{other} {one}".replace("start", "START").replace("end", "start").replace("START", "end")
+        assert f"<ssd:Connection {one} {other}/>" in turned
+        turned = turned.replace(f"<ssd:Connection {one} {other}/>", f"<ssd:Connection {swapped}/>")
+    assert wired(archive(tmp_path / "turned.ssp", turned)) == wired(archive(tmp_path / "n.ssp"))
+
+
+def test_a_value_that_fits_nothing_is_ignored_and_said(tmp_path: Path) -> None:
+    """SSP 1.0, 5.3.2: a set may hold values for other systems, texts among them."""
+    more = NESTED.replace(
+        "</ssv:Parameters>",
+        '<ssv:Parameter name="kk"><ssv:Real value="1" unit="[strange]"/></ssv:Parameter>'
+        '<ssv:Parameter name="colour"><ssv:String value="red"/></ssv:Parameter></ssv:Parameters>',
+    )
+    path = archive(tmp_path / "more.ssp", more)
+    assert wired(path) == wired(archive(tmp_path / "nested.ssp"))
+    system = described(path)
+    assert len(system.notes) == 2
+    assert "nothing is named 'inner.slow.kk', so it is ignored. Did you mean 'k'?" in system.notes[0]
+
+
+def test_parameters_and_start_values_come_through_the_connectors_of_systems(tmp_path: Path) -> None:
+    """What the outer system sets wins over what the inner one sets, and the connector is a parameter of the whole."""
+    gain = '<ssd:Connector name="gain" kind="parameter"><ssc:Real/></ssd:Connector></ssd:Connectors>'
+    structure = NESTED.replace("</ssd:Connectors>", gain, 1)
+    inner = structure.index('<ssd:System name="inner">')
+    inside = structure[inner:].replace("</ssd:Connectors>", gain, 1)
+    inside = inside.replace(
+        "</ssd:Connections>",
+        '<ssd:Connection startConnector="gain" endElement="slow" endConnector="k"/></ssd:Connections>',
+        1,
+    )
+    inside = inside.replace(
+        "</ssd:Connections></ssd:System></ssd:SystemStructureDescription>",
+        '<ssd:Connection startConnector="gain" endElement="inner" endConnector="gain">'
+        '<ssc:LinearTransformation factor="2" offset="-1"/></ssd:Connection>'
+        "</ssd:Connections></ssd:System></ssd:SystemStructureDescription>",
+    )
+    values = (
+        "<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>"
+        '<ssv:ParameterSet version="1.0" name="p"><ssv:Parameters>{}</ssv:Parameters></ssv:ParameterSet>'
+        "</ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings><ssd:Elements>"
+    )
+    given = '<ssv:Parameter name="{}"><ssv:Real value="{}"/></ssv:Parameter>'
+    inner_only = values.format(given.format("inner.gain", 7.0))
+    both = values.format(given.format("gain", -0.5) + given.format("inner.gain", 7.0))
+    outer = structure[:inner]
+    weak = described(archive(tmp_path / "weak.ssp", outer.replace("<ssd:Elements>", inner_only, 1) + inside))
+    assert weak.component("inner.slow").start["k"] == 7.0
+    path = archive(tmp_path / "strong.ssp", outer.replace("<ssd:Elements>", both, 1) + inside)
+    assert described(path).component("inner.slow").start["k"] == -2.0
+    gain_of_all = read_description(path).variables["gain"]
+    assert (gain_of_all.causality, gain_of_all.start) == ("parameter", -0.5)
+    plain = simulated(path, "shown", {"fast.tau": VALUES["fast.tau"]})
+    assert np.max(np.abs(plain - ring(TIME)[:, 1])) < 1e-7
+    halved = simulated(path, "shown", {"fast.tau": VALUES["fast.tau"], "gain": 0.0})  # k = -1
+    direct = simulated(path, "shown", {"fast.tau": VALUES["fast.tau"], "inner.slow.k": -1.0})
+    assert np.array_equal(halved, direct)
+    assert np.max(np.abs(halved - plain)) > 0.1
+
+
+def test_a_nested_system_whose_connector_is_left_open_keeps_its_start_value(tmp_path: Path) -> None:
+    cut = NESTED.replace(
+        '<ssd:Connection startElement="fast" startConnector="y" endElement="inner" endConnector="u"/>', ""
+    )
+    description = read_description(archive(tmp_path / "open.ssp", cut))
+    assert description.variables["inner.u"].causality == "input"
+    assert description.variables["inner.slow.u"].causality == "local"
+
+
+DICTIONARY = (
+    '<ssd:SignalDictionaries><ssd:SignalDictionary name="bus" source="resources/bus.ssb"/>'
+    "</ssd:SignalDictionaries>"
+)
+SSB = (
+    '<ssb:SignalDictionary xmlns:ssb="http://ssp-standard.org/SSP1/SystemStructureSignalDictionary" version="1.0"'
+    ' xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"><ssb:DictionaryEntry name="speed"><ssc:Real/>'
+    "</ssb:DictionaryEntry></ssb:SignalDictionary>"
+)
+
+
+def test_signals_of_a_dictionary_connect_what_refers_to_it(tmp_path: Path) -> None:
+    """``fast.y`` is written into the bus outside, and read from it inside the nested system."""
+    reference = '<ssd:SignalDictionaryReference name="{}" dictionary="bus"/></ssd:Elements>'
+    structure = NESTED.replace("<ssd:Elements>", DICTIONARY + "<ssd:Elements>", 1)
+    structure = structure.replace("</ssd:Elements>", reference.format("inside"), 1)
+    parts = structure.rsplit("</ssd:Elements>", 1)
+    structure = reference.format("outside").join(parts)
+    structure = structure.replace(
+        '<ssd:Connection startConnector="u" endElement="slow" endConnector="u"/>',
+        '<ssd:Connection startElement="inside" startConnector="speed" endElement="slow" endConnector="u"/>',
+    ).replace('endElement="inner" endConnector="u"', 'endElement="outside" endConnector="speed"')
+    path = archive(tmp_path / "bus.ssp", structure, **{"resources__bus.ssb": SSB})
+    found = simulated(path, "shown", {"fast.tau": VALUES["fast.tau"]})
+    assert np.max(np.abs(found - ring(TIME)[:, 1])) < 1e-7
+    lost = archive(tmp_path / "lost.ssp", structure, **{"resources__bus.ssb": SSB.replace("speed", "sped")})
+    with pytest.raises(FmuError, match=r"the signal dictionary 'bus' has no 'speed'\. Did you mean 'sped'\?"):
+        read_description(lost)
+
+
+def test_units_convert_before_the_transformation_by_the_definitions_of_the_file(tmp_path: Path) -> None:
+    """SSP 1.0, 4.5.1: target = factor * (source in the target's unit) + offset."""
+    units = (
+        '<ssd:Units><ssc:Unit name="Schritt"><ssc:BaseUnit m="1" s="-1" factor="0.75"/></ssc:Unit>'
+        '<ssc:Unit name="Elle"><ssc:BaseUnit m="1" s="-1" factor="0.5"/></ssc:Unit></ssd:Units>'
+        "</ssd:SystemStructureDescription>"
+    )
+    structure = NESTED.replace(
+        '<ssd:Connector name="u" kind="input"><ssc:Real/>',
+        '<ssd:Connector name="u" kind="input"><ssc:Real unit="Schritt"/>',
+    )
+    structure = structure.replace(
+        '<ssd:Connector name="shown" kind="output"><ssc:Real/></ssd:Connector>',
+        '<ssd:Connector name="way" kind="input"><ssc:Real unit="Elle"/></ssd:Connector>',
+    )
+    structure = structure.replace(
+        '<ssd:Connection startElement="fast" startConnector="y" endElement="inner" endConnector="u"/>',
+        '<ssd:Connection startConnector="way" endElement="inner" endConnector="u">'
+        '<ssc:LinearTransformation factor="3" offset="0.5"/></ssd:Connection>',
+    ).replace('<ssd:Connection startElement="inner" startConnector="y" endConnector="shown"/>', "")
+    path = archive(tmp_path / "units.ssp", structure.replace("</ssd:SystemStructureDescription>", units))
+    (way,) = described(path).connectors
+    (((component, variable), factor, offset),) = way.pins
+    assert (component, variable) == ("inner.slow", "u")
+    assert factor == pytest.approx(3 * 0.5)  # on to m/s by way of Schritt
+    assert offset == pytest.approx(0.5 * 0.75)  # 0.5 Schritt
+
+
 SECOND_WRITER = '<ssd:Connection startElement="fast" startConnector="y" endElement="fast" endConnector="u"/>'
 END = "</ssd:Connections></ssd:System></ssd:SystemStructureDescription>"
 WRONG = [
@@ -158,9 +330,15 @@ WRONG = [
     ),
     (END, SECOND_WRITER + END, "fast.u has two writers"),
     ('source="resources/slow.ssv"', 'source="resources/none.ssv"', "holds no resources/none.ssv"),
-    ('name="k"', 'name="kk"', "has no variable 'kk'"),
     ('source="time constant"', 'source="tau"', "a parameter mapping names 'tau', which its values lack"),
     ('factor="1"', 'factor="one"', "a factor is 'one', which is no number"),
+    (
+        'target="slow.tau"',
+        'target="slow.taw"',
+        "sets 'inner.slow.taw', but there is no such variable. Did you mean",
+    ),
+    ('<ssv:Real value="-2"/>', '<ssv:String value="-2"/>', "'k' holds String; only numbers can be set"),
+    ('endElement="inner" endConnector="u"', 'endElement="inner" endConnector="y"', "joins two that send"),
     ("</ssd:SystemStructureDescription>", "", "is no valid XML"),
     ('name="fast"', 'name="fast" implementation="ScheduledExecution"', "asks for 'ScheduledExecution'"),
     (

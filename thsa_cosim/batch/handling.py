@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.local import LocalRunner
@@ -141,8 +142,9 @@ def try_input_handling(experiment: Experiment, *, deadline_s: float | None = 60.
         if reason or coarse.signals is None or half.signals is None:
             ways.append(Way(mode, np.inf, np.inf, "", reason))
             continue
-        error, worst = largest_change(reference, coarse.signals.values)
-        halved, _ = largest_change(reference, {n: v[::2] for n, v in half.signals.values.items()})
+        error, worst = largest_change(reference, coarse.signals.values, jumps=True)
+        at_points = {n: v[::2] for n, v in half.signals.values.items()}
+        halved, _ = largest_change(reference, at_points, jumps=True)
         ways.append(Way(mode, error, halved, worst))
     confirmed = source == "Model Exchange" and (
         not any(np.isfinite(w.error) for w in ways) or any(w.is_consistent for w in ways)
@@ -163,21 +165,54 @@ def refined(time: FloatArray, parts: int) -> FloatArray:
 
 
 def largest_change(
-    reference: Mapping[str, FloatArray], found: Mapping[str, FloatArray], names: Sequence[str] | None = None
+    reference: Mapping[str, FloatArray],
+    found: Mapping[str, FloatArray],
+    names: Sequence[str] | None = None,
+    *,
+    jumps: bool = False,
 ) -> tuple[float, str]:
     """Return the largest deviation over all signals, relative to each one's range, and whose it is.
 
     A range counts as at least 1e-9 of the signal's size, and of 1e-9 of the largest signal of its kind: a signal that
-    is zero but for rounding is no reason for alarm.
+    is zero but for rounding is no reason for alarm. ``jumps``: a signal may jump a little earlier or later, as events
+    do that fall between communication points, and one that switches all the time is compared by its integral.
     """
     changes = {}
     for name in names or reference:
-        difference = float(np.max(np.abs(found[name] - reference[name])))
+        deviation = np.abs(found[name] - reference[name])
         size = float(np.max(np.abs(reference[name])))
         scale = max(float(np.ptp(reference[name])), _FLOOR * size, _TINY)
+        if jumps and float(np.max(deviation)) > _JUMP * scale:
+            deviation = _beside_jumps(reference[name], found[name], deviation, scale)
+        difference = float(np.max(deviation))
         changes[name] = difference / scale if difference > _FLOOR * size + _TINY else 0.0
     worst = max(changes, key=lambda name: changes[name])
     return changes[worst], worst
+
+
+_JUMP = 0.1
+"""Share of its range that a signal jumps by between two samples."""
+_SWITCHING = 0.1
+"""Share of samples with a jump from which on a signal switches all the time."""
+_SHIFT = 0.003
+"""Share of all samples that a jump may come earlier or later; a sample at least."""
+
+
+def _beside_jumps(
+    reference: FloatArray, found: FloatArray, deviation: FloatArray, scale: float
+) -> FloatArray:
+    """The deviation (n,); near a jump that from the nearest sample around; of a signal that switches its mean's."""
+    jumps = np.abs(np.diff(reference)) > _JUMP * scale
+    if np.mean(jumps) > _SWITCHING:
+        together = np.cumsum(reference - reference[0])
+        return np.asarray(np.abs(np.cumsum(found - reference)) * scale / max(float(np.ptp(together)), _TINY))
+    reach = max(1, round(_SHIFT * reference.size))
+    near = np.zeros(reference.size, dtype=bool)
+    for k in np.flatnonzero(jumps).tolist():
+        near[max(k - reach + 1, 0) : k + reach + 1] = True
+    around = sliding_window_view(np.pad(reference, reach, mode="edge"), 2 * reach + 1)
+    nearest = np.abs(around - found[:, None]).min(axis=1)
+    return np.asarray(np.where(near, nearest, deviation))
 
 
 _TINY = 1e-12

@@ -77,6 +77,6 @@ def _check_names(description: FmuDescription, given: Excitation) -> None:
     for name in given.ends:
         if name not in movable:
             raise ParameterError(
-                f"{description.path}: {description.variable(name).name} is no input that can run linearly; "
+                f"{description.path}: {description.variable(name).name} is no floating-point input; "
                 f"those are {', '.join(movable) or 'none'}."
             )

@@ -1,6 +1,7 @@
 """Trials of an FMU's numbers: inputs, communication step, both interfaces, start values."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from thsa_cosim.signals import FloatArray, Signals
 
 STEP_OK, STEP_WARNING = 1e-4, 1e-2
 """Change of an output, relative to its range, when the communication step is halved."""
+STEP_FAILED = 0.1
+"""Above this change a step is wrong even where a shorter one would do."""
 AGREE = 1e-3
 """Deviation between ways of simulating the same that still counts as agreement."""
 _FAR = 20.0
@@ -44,12 +47,34 @@ def judge_step(first: Signals, outcome: Outcome, step: float, fixed: bool = Fals
             text = f"it declares steps of any size, and refuses half of {step:g} s: {outcome.reason}"
             return Verdict.WARNING, text, {}
         return Verdict.WARNING, f"halved, it fails: {outcome.status}: {outcome.reason}", {}
-    change, worst = largest_change(first.values, {n: outcome.signals[n][::2] for n in first.names})
+    change, worst = halving(first, outcome.signals)
     verdict = Verdict.FAILED
     if change <= STEP_WARNING:
         verdict = Verdict.OK if change <= STEP_OK else Verdict.WARNING
     text = f"halving {step:g} s changes {worst} by {change:.1e} of its range"
     return verdict, text if change else "halving it changes nothing", {"change": change}
+
+
+def halving(coarse: Signals, fine: Signals) -> tuple[float, str]:
+    """What half the step changes, over range, and whose change it is."""
+    return largest_change(coarse.values, {n: fine[n][::2] for n in coarse.names}, jumps=True)
+
+
+def judge_shorter_steps(judged: Judged, runs: Sequence[tuple[float, Outcome]]) -> Judged:
+    """Add to the line of a step that is too long the first shorter one whose halving changes little enough.
+
+    ``runs``: (step, outcome), each half of the one before, the first one being half of what was judged.
+    """
+    verdict, text, values = judged
+    for (step, coarse), (_, fine) in pairwise(runs):
+        if coarse.signals is None or fine.signals is None:
+            break
+        change, _ = halving(coarse.signals, fine.signals)
+        if change <= STEP_WARNING:
+            mild = values.get("change", np.inf) <= STEP_FAILED
+            text = f"{text}; halving {step:g} s changes {change:.1e}: use that step"
+            return Verdict.WARNING if mild else verdict, text, {**values, "usable_step_s": step}
+    return verdict, f"{text}, and shorter steps change as much: no step is known to be right", values
 
 
 def judge_longer_step(first: Signals, outcome: Outcome, step: float, change: float) -> Judged:
@@ -58,7 +83,7 @@ def judge_longer_step(first: Signals, outcome: Outcome, step: float, change: flo
         return Verdict.OK, f"{2.0 * step:g} s is refused: {outcome.reason}", {}
     count = len(outcome.signals.time)
     reference = {n: first[n][: 2 * count : 2][:count] for n in first.names}
-    doubled, worst = largest_change(reference, outcome.signals.values)
+    doubled, worst = largest_change(reference, outcome.signals.values, jumps=True)
     if doubled <= max(STEP_WARNING, 30.0 * change):
         return (
             Verdict.OK,
@@ -82,7 +107,7 @@ def judge_larger_inputs(
                 {},
             )
         found = {n: v[::2] for n, v in half.signals.values.items()}
-        change, name = largest_change(coarse.signals.values, found)
+        change, name = largest_change(coarse.signals.values, found, jumps=True)
         worst = max(worst, change)
         if change > STEP_WARNING:
             text = (
@@ -97,13 +122,16 @@ def judge_exchange(first: Signals, outcome: Outcome) -> Judged:
     """Whether both interfaces say the same."""
     if not outcome.ok or outcome.signals is None:
         return Verdict.WARNING, f"it fails, Co-Simulation works: {outcome.status}: {outcome.reason}", {}
-    change, worst = largest_change(first.values, outcome.signals.values)
+    change, worst = largest_change(first.values, outcome.signals.values, jumps=True)
     text = f"{worst} differs from Co-Simulation by {change:.1e} of its range"
     return Verdict.OK if change <= AGREE else Verdict.WARNING, text, {"change": change}
 
 
-def judge_changes(first: Signals, outcomes: Mapping[str, Outcome], what: str) -> Judged:
-    """Which of ``outcomes``, each with one thing changed, differ from the first run at all."""
+def judge_changes(first: Signals, outcomes: Mapping[str, Outcome], what: str, untried: int = 0) -> Judged:
+    """Which of ``outcomes``, each with one thing changed, differ from the first run at all.
+
+    ``untried``: how many more there are.
+    """
     silent = [
         name
         for name, outcome in outcomes.items()
@@ -118,6 +146,8 @@ def judge_changes(first: Signals, outcomes: Mapping[str, Outcome], what: str) ->
         text += f"; nothing changes with {listed}"
     if failing:
         text += f"; the run fails with another {', '.join(failing[:5])}"
+    if untried:
+        text += f"; {untried} more were not tried"
     if n and quiet == n:
         return Verdict.WARNING, f"no output changes with any of {n} {what}: they are ignored", values
     return Verdict.OK, text, values

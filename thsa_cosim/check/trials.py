@@ -6,9 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome
+from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
 from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined, try_input_handling
 from thsa_cosim.check import coupling, numerics
+from thsa_cosim.check.budget import LONGEST_RUN, SLOW_SHARES, Budget, is_slow
 from thsa_cosim.check.excitation import Excitation
 from thsa_cosim.check.finding import Finding, Verdict
 from thsa_cosim.fmu import FmuDescription, probe
@@ -23,11 +24,16 @@ _LEAK_BYTES = 2048
 """Growth per cycle that counts as a leak; an interpreter alone stays well below."""
 _SHORT = 200
 """Communication points of a run that is repeated to watch memory."""
+_CYCLES = 50
 _ONE_BY_ONE = 60
 """Parameters, and inputs, that are tried one by one at most."""
 _MANY_STEPS = 20_000
 _LONG = 3000
 _LARGER = (10.0, 100.0)
+_BY_INPUTS = (Status.NOT_FINITE, Status.FMI_ERROR, Status.FMI_DISCARD, Status.INCOMPLETE)
+"""How a run may fail because its inputs ask too much."""
+_PARTS = (4, 8, 16, 32)
+"""Into how many parts a step is divided that turns out to be too long."""
 
 
 class Trials:
@@ -55,6 +61,9 @@ class Trials:
         self._handling: HandlingTrial | None = None
         self._first = Signals(self._time, {})
         self._halves = True
+        self._budget = Budget()
+        self._rests = False
+        self._slowness = ""
         self._changed = {
             name: value
             for name, value in probe.changed_parameters(description).items()
@@ -62,11 +71,17 @@ class Trials:
         }
         self.findings: list[Finding] = []
 
-    def _excited(self, *, times: float = 1.0, only: str | None = None) -> Signals | None:
+    def _excited(
+        self, *, times: float = 1.0, only: str | None = None, time: FloatArray | None = None
+    ) -> Signals | None:
         if self._given.inputs is not None:
             return self._given.inputs
         return probe.kinked_inputs(
-            self._description, self._time, ends=self._given.ends, times=times, only=only
+            self._description,
+            self._time if time is None else time,
+            ends=self._given.ends,
+            times=times,
+            only=only,
         )
 
     def _note(self, name: str, verdict: Verdict, text: str, **values: float) -> None:
@@ -104,7 +119,7 @@ class Trials:
             self._experiment("halved", probe.halved(self._time)),
             self._experiment("doubled", self._time[::2] if len(self._time) > 2 else self._time),
             replace(
-                self._experiment("short", self._time[: max(2, min(len(self._time), _SHORT))]),
+                self._experiment("short", self._time[: self._short_points()]),
                 reduce=probe.footprint,
             ),
             *more,
@@ -118,6 +133,12 @@ class Trials:
             backend=("python" if len(self._time) < _LONG else None) if backend == "auto" else backend,
             recycle_growth_mb=1e6,
         )
+
+    def _short_runs(self, cycles: int) -> int:
+        return self._budget.runs(_WARM_UP + cycles, self._short_points())
+
+    def _short_points(self) -> int:
+        return self._budget.points_for(_WARM_UP + _CYCLES, min(len(self._time), _SHORT))
 
     # -- lines ------------------------------------------------------------------------------------------
     def description_lines(self) -> None:
@@ -148,51 +169,124 @@ class Trials:
         later = ("fresh instance", "new process", "reset", "communication step", "memory", "file handles")
         if not self._outputs:
             self._note(
-                "runs", Verdict.NOT_TRIED, "it has no floating-point output or local variable to watch"
+                "runs",
+                Verdict.NOT_TRIED,
+                "it has no number among its outputs, states and local variables to watch",
             )
             return False
-        doubt = ""
-        outcome = self._try()
-        if not outcome.ok and self._may_be_cut():
-            whole, reason = self._time, outcome.reason
-            self._time = self._given.communication_points(self._description, cut=True)
-            self._inputs = self._excited()
-            outcome = self._try()
-            if outcome.ok:
-                done = f"{np.ptp(self._time):g} s of {np.ptp(whole):g} s"
-                doubt = f"; only {done}, as it fails in longer steps ({reason})"
-        if not outcome.ok and self._given.kind is None and self._kind == "co-simulation":
-            outcome, doubt = self._fall_back(outcome)
+        whole = self._time
+        outcome, doubt = self._first_outcome()
         if not outcome.ok or outcome.signals is None:
             self._note("runs", Verdict.FAILED, f"{outcome.status}: {outcome.reason}")
             for name in later:
                 self._note(name, Verdict.NOT_TRIED, "the first run failed")
             return False
+        self._budget = Budget(outcome.duration_s, len(self._time))
         self._first = outcome.signals
         if (judged := numerics.judge_first_values(self._first)) is not None:
             self._take("first values", judged)
         does = numerics.moves(outcome.signals)
-        steps = len(self._time) - 1
+        reached = whole if self._slowness else self._time
+        steps, doubt = len(reached) - 1, doubt + self._slowness
         self._note(
             "runs",
             Verdict.OK if does and not doubt else Verdict.WARNING,
-            f"{self._kind}, {np.ptp(self._time):g} s in {steps} steps, {self._moved()}{doubt}"
+            f"{self._kind}, {np.ptp(reached):g} s in {steps} steps{self._whose_duration()}, {self._moved()}{doubt}"
             + ("" if does else "; no output moves, so what follows shows little"),
             duration_s=outcome.duration_s,
             steps=steps,
         )
         return True
 
+    @property
+    def _is_free(self) -> bool:
+        """Whether nobody said how long to simulate."""
+        return self._given.time is None and self._given.duration is None
+
+    def _first_outcome(self) -> tuple[Outcome, str]:
+        """The first run that succeeds, whole if possible, and what is to be said where it is not."""
+        whole = self._time
+        outcome = self._try()
+        reason, doubt = outcome.reason, ""
+        if outcome.status is Status.TIMEOUT and self._is_free:
+            outcome, doubt = self._cut_to_what_is_fast(outcome)
+        elif not outcome.ok and self._may_be_cut():
+            self._shorten(self._given.communication_points(self._description, cut=True))
+            outcome = self._try()
+            done = f"{np.ptp(self._time):g} s of {np.ptp(whole):g} s"
+            doubt = f"; only {done}, as it fails in longer steps ({reason})"
+        if not outcome.ok and self._given.kind is None and self._kind == "co-simulation":
+            self._shorten(whole)
+            outcome, doubt = self._fall_back(outcome)
+        if not outcome.ok and outcome.status in _BY_INPUTS:
+            outcome, doubt = self._at_rest(outcome)
+        return outcome, doubt
+
+    def _at_rest(self, failed: Outcome) -> tuple[Outcome, str]:
+        """Hold inputs of which nobody said where they run: does it fail because of them?"""
+        if self._given.inputs is not None or self._inputs is None or self._given.ends:
+            return failed, ""
+        moving, self._inputs = self._inputs, self._still()
+        outcome = self._try()
+        if outcome.ok:
+            self._rests = True
+            doubt = f"; with inputs that move it fails ({failed.reason}): say how far they run (--input NAME=VALUE)"
+            return outcome, doubt
+        self._inputs = moving
+        return replace(failed, reason=f"{failed.reason}; with its inputs at rest it fails, too"), ""
+
+    def _still(self) -> Signals:
+        assert self._inputs is not None
+        held = {n: np.full(len(self._time), v[0]) for n, v in self._inputs.values.items()}
+        return Signals(self._time, held)
+
+    def _shorten(self, time: FloatArray) -> None:
+        self._time = time
+        self._inputs = self._excited()
+
+    def _cut_to_what_is_fast(self, killed: Outcome) -> tuple[Outcome, str]:
+        """Run the begin of an experiment that outlasts the deadline, unless it hangs there."""
+        whole = self._time
+        for share in SLOW_SHARES:
+            points = max(int(share * len(whole)), 2)
+            self._shorten(whole[:points])
+            outcome = self._run_once()
+            if outcome.status is Status.TIMEOUT:
+                continue
+            if not outcome.ok or not is_slow(outcome.duration_s, share, self._deadline):
+                break
+            fast = int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))
+            self._shorten(whole[:fast])
+            outcome = self._try()
+            done = f"{np.ptp(self._time):.3g} s of {np.ptp(whole):g} s"
+            return outcome, f"; only {done}: all of it takes more than {self._deadline:g} s (see --deadline)"
+        return killed, ""
+
+    def _whose_duration(self) -> str:
+        stop = self._description.default_experiment.stop
+        given = self._given.duration is not None or self._given.time is not None
+        return "" if given or stop is not None else " (it declares no stop time: see --duration)"
+
     def _moved(self) -> str:
         if self._given.inputs is not None:
             return "the given inputs"
         if self._inputs is None:
-            return "no inputs to move"
+            return "no floating-point inputs to move"
+        if self._rests:
+            return "inputs at their start values"
         return "inputs ramping away from their start values, with kinks"
 
     def _try(self) -> Outcome:
         """Run once; find out how inputs are to be given, and run so."""
         outcome = self._run_once()
+        if outcome.ok and outcome.duration_s > LONGEST_RUN and self._is_free:
+            seconds, points = np.ptp(self._time), len(self._time)
+            self._shorten(self._time[: int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))])
+            self._slowness = (
+                f"; it took {outcome.duration_s:.3g} s, so what follows is tried over"
+                f" {np.ptp(self._time):.3g} s of {seconds:g} s"
+            )
+            outcome = self._run_once()
         told = self._given.input_mode is not None or is_ours(self._description)
         if told or not outcome.ok or self._kind != "co-simulation":
             return outcome
@@ -212,7 +306,9 @@ class Trials:
         return given.time is None and given.step is None and given.duration is None and self._was_coarsened()
 
     def _was_coarsened(self) -> bool:
-        return len(self._given.communication_points(self._description, cut=True)) != len(self._time)
+        """Whether the steps are longer than what the FMU declares, so that the stop time is reached."""
+        declared = self._given.communication_points(self._description, cut=True)
+        return bool(self._time[1] - self._time[0] > 1.001 * (declared[1] - declared[0]))
 
     def _fall_back(self, failed: Outcome) -> tuple[Outcome, str]:
         """Try Model Exchange where Co-Simulation does not run."""
@@ -228,7 +324,7 @@ class Trials:
     def inputs_lines(self) -> None:
         """Say how inputs are given, and which of them do something."""
         if self._inputs is None:
-            self._note("inputs", Verdict.OK, "it has none that run linearly")
+            self._note("inputs", Verdict.OK, "it has none that are floating-point numbers")
             return
         if is_ours(self._description):
             mode = input_modes(self._description, probe.excitable(self._description))[-1]
@@ -238,26 +334,27 @@ class Trials:
         elif self._kind == "model-exchange" or self._handling is not None:
             trial = self._handling or HandlingTrial("", (), True)
             self._take("inputs", numerics.judge_handling(trial, self._kind))
-        names = [v.name for v in probe.excitable(self._description)][:_ONE_BY_ONE]
-        if self._given.inputs is not None or len(names) < 2:
+        every = [v.name for v in probe.excitable(self._description)]
+        names = every[: self._budget.runs(_ONE_BY_ONE)]
+        if self._given.inputs is not None or self._rests or len(names) < 2:
             return
-        still = Signals(
-            self._time, {n: np.full(len(self._time), v[0]) for n, v in self._inputs.values.items()}
-        )
-        alone = [self._experiment("none", self._time, still)]
+        alone = [self._experiment("none", self._time, self._still())]
         alone += [self._experiment(f"input {n}", self._time, self._excited(only=n)) for n in names]
         with self._runner(more=alone) as runner:
             outcomes = runner.run([Job(e.name) for e in alone])
         if outcomes[0].signals is not None:
             changed = dict(zip(names, outcomes[1:], strict=True))
-            self._take("each input", numerics.judge_changes(outcomes[0].signals, changed, "inputs"))
+            untried = len(every) - len(names)
+            judged = numerics.judge_changes(outcomes[0].signals, changed, "inputs", untried)
+            self._take("each input", judged)
 
     def start_value_line(self) -> None:
         """Change one start value after the other: each must change something, compared with a fresh instance."""
         name = "start values"
         changed = probe.changed_parameters(self._description, zeros=True)
         named = self._given.parameters or tuple(n for n in changed if n not in self._values)
-        tried = {n: changed[n] for n in named[:_ONE_BY_ONE] if n in changed}
+        most = self._budget.runs(_ONE_BY_ONE)
+        tried = {n: changed[n] for n in named[:most] if n in changed}
         if not tried:
             self._note(name, Verdict.NOT_TRIED, "it has no parameter to change")
             return
@@ -275,7 +372,8 @@ class Trials:
         if repeats and (judged := numerics.judge_declared(self._first, as_declared)) is not None:
             self._take("declared values", judged)
         found = dict(zip(tried, outcomes, strict=True))
-        self._take(name, numerics.judge_changes(self._first, found, "start values"))
+        untried = sum(n in changed for n in named[most:])
+        self._take(name, numerics.judge_changes(self._first, found, "start values", untried))
 
     def fresh_lines(self, cycles: int) -> bool:
         """Use a new instance per run; return whether the FMU runs with other start values."""
@@ -295,7 +393,7 @@ class Trials:
                 for name in ("memory over instances", "file handles over instances"):
                     self._note(name, Verdict.NOT_TRIED, "there is one instance per process")
             else:
-                self._leak_lines("instances", runner.run([Job("short")] * (_WARM_UP + cycles)))
+                self._leak_lines("instances", runner.run([Job("short")] * self._short_runs(cycles)))
             return runner.run([Job("trial", self._changed)])[0].ok
 
     def reset_lines(self, cycles: int, runs_changed: bool) -> None:
@@ -313,7 +411,7 @@ class Trials:
             else:
                 why = "it does not run with other start values" if self._changed else "it has none to change"
                 self._note(name, Verdict.NOT_TRIED, why)
-            self._leak_lines("resets", runner.run([Job("short")] * (_WARM_UP + cycles)))
+            self._leak_lines("resets", runner.run([Job("short")] * self._short_runs(cycles)))
 
     def _step_lines(self, halved: Outcome, doubled: Outcome) -> None:
         name = "communication step"
@@ -328,16 +426,51 @@ class Trials:
         fixed = not self._description.capabilities.get("canHandleVariableCommunicationStepSize")
         judged = numerics.judge_step(self._first, halved, step, fixed)
         self._halves = halved.ok
+        if judged[0] is not Verdict.OK and self._may_be_cut():
+            self._take(name, self._declared_step(step, fixed))
+            return
+        if judged[0] is Verdict.FAILED:
+            judged = numerics.judge_shorter_steps(judged, [(step / 2, halved), *self._shorter_runs(step)])
         self._take(name, judged)
         if len(self._time) > 2 and self._given.inputs is None:  # else the step is the user's
             change = judged[2].get("change", 0.0)
             self._take("longer step", numerics.judge_longer_step(self._first, doubled, step, change))
 
+    def _declared_step(self, coarse: float, fixed: bool) -> numerics.Judged:
+        """Halve the step that the FMU declares, over the begin of the experiment."""
+        time = self._given.communication_points(self._description, cut=True)
+        step, inputs = float(time[1] - time[0]), self._excited(time=time)
+        grids = {"declared": time, "declared/2": probe.halved(time)}
+        with self._runner(more=[self._experiment(n, t, inputs) for n, t in grids.items()]) as runner:
+            whole, halved = runner.run([Job(name) for name in grids])
+        if whole.signals is None:
+            text = f"{coarse:g} s is too long, and its own {step:g} s fails: {whole.status}: {whole.reason}"
+            return Verdict.FAILED, text, {}
+        verdict, text, values = numerics.judge_step(whole.signals, halved, step, fixed)
+        text = f"{text}, over {np.ptp(time):g} s; {coarse:g} s, with which the stop time was reached, is too long"
+        return verdict, text, values
+
+    def _shorter_runs(self, step: float) -> list[tuple[float, Outcome]]:
+        """Runs with a quarter of the step and less, as far as they are affordable."""
+        parts = [n for n in _PARTS if self._budget.run_s * n < LONGEST_RUN * 10]
+        finer = [self._experiment(f"h/{n}", refined(self._time, n)) for n in parts]
+        if not finer:
+            return []
+        with self._runner(more=finer) as runner:
+            outcomes = runner.run([Job(e.name) for e in finer])
+        return [(step / n, outcome) for n, outcome in zip(parts, outcomes, strict=True)]
+
     def larger_inputs_line(self) -> None:
         """Inputs of which nobody says how large they are: try larger ones, too."""
         unknown = [v for v in probe.excitable(self._description) if probe.is_undeclared(v)]
         unknown = [v for v in unknown if v.name not in self._given.ends]
-        if self._given.inputs is not None or not unknown or self._kind != "co-simulation" or not self._halves:
+        if (
+            self._given.inputs is not None
+            or self._rests
+            or not unknown
+            or self._kind != "co-simulation"
+            or not self._halves
+        ):
             return
         if is_ours(self._description):  # it controls its own step
             return
@@ -375,7 +508,7 @@ class Trials:
             self._note(memory, Verdict.FAILED, f"{failed.status}: {failed.reason}")
             self._note(files, Verdict.NOT_TRIED, "a run failed")
             return
-        prints = np.array([outcome.reduced for outcome in outcomes])[_WARM_UP:]
+        prints = np.array([outcome.reduced for outcome in outcomes])[min(_WARM_UP, len(outcomes) // 2) :]
         if not np.isfinite(prints).all():
             for name in (memory, files):
                 self._note(name, Verdict.NOT_TRIED, "this platform does not tell")

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import gmtime, strftime
 
-from thsa_cosim.export.causal import CausalModel
 from thsa_cosim.export.codegen import config_header, identifier, model_source
 from thsa_cosim.export.compile import PLATFORMS, Platform, compile_library
 from thsa_cosim.export.description import build_description, fmi2_description, fmi3_description
+from thsa_cosim.export.model import CausalModel
 
 RUNTIME = Path(__file__).parent / "runtime"
 _HEADERS = {

@@ -1,7 +1,7 @@
 """Flat model → explicit ordinary differential equation with outputs, events and initial values (CasADi SX)."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+import math
+from dataclasses import replace
 
 import casadi as ca
 
@@ -9,94 +9,16 @@ from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export.discrete import referenced, split_discrete
 from thsa_cosim.export.domain import with_domains
 from thsa_cosim.export.expression import Translator
-from thsa_cosim.export.solve import HOMOTOPY, Block, EquationSystem
+from thsa_cosim.export.initialization import Initial, first_indicators, initial_values, simplified_indicators
+from thsa_cosim.export.model import CausalModel, Events, column
+from thsa_cosim.export.solve import HOMOTOPY, EquationSystem
 from thsa_cosim.export.uniqueness import several_solutions
+from thsa_cosim.export.variables import VariableTable
 from thsa_cosim.modelica.flat import Assertion, FlatEquation, FlatModel, FlatVariable
 from thsa_cosim.modelica.terms import Scalar, Term, make, plain, substitute, text, walk
 
-
-@dataclass(frozen=True)
-class ModelVariable:
-    """One variable of the exported model.
-
-    ``kind`` is "state", "derivative", "input", "parameter", "dependent" or "algebraic"; ``index`` counts within the
-    kind. Aliases share kind and index. ``start`` is given where it may be set before initialization. ``discrete`` says
-    that the value changes at events only.
-    """
-
-    name: str
-    kind: str
-    index: int
-    causality: str
-    unit: str | None
-    description: str
-    start: float | None
-    minimum: float | None
-    maximum: float | None
-    nominal: float | None
-    discrete: bool = False
-
-
-@dataclass(frozen=True)
-class Events:
-    """What happens at events, over the symbols of the model.
-
-    ``z`` are the discrete variables, the first ``left`` of them left limits of continuous ones; ``update`` are their
-    new values, ``z_start`` those before the first event; ``reinit`` are the new values of the states. ``samples`` has
-    the columns start and interval. In the model's m follow on the modes: z, pre(z), one tick a sample, and a 1 that
-    holds while the initial values are found.
-    """
-
-    z: tuple[str, ...] = ()
-    left: int = 0
-    update: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    z_start: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    reinit: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    samples: ca.SX = field(default_factory=lambda: ca.SX(0, 2))
-    used: bool = False
-
-
-@dataclass(frozen=True)
-class CausalModel:
-    """dx/dt = f(t, x, u, p, d, m, y), w = h(...), g = event indicators, x(0) = initial(...).
-
-    p are the parameters that can be set, d = dependent(p) the calculated ones, m the modes (relation k holds when
-    g[k] > 0) and what else is constant between events. y are the unknowns of the implicit ``blocks``, whose residuals
-    are zero. All expressions are CasADi SX columns over the symbols of this object.
-    """
-
-    flat: FlatModel
-    states: tuple[str, ...]
-    variables: tuple[ModelVariable, ...]
-    time: ca.SX
-    x: ca.SX
-    u: ca.SX
-    p: ca.SX
-    d: ca.SX
-    m: ca.SX
-    x_start: ca.SX
-    rhs: ca.SX
-    w: ca.SX
-    outputs: int
-    g: ca.SX
-    dependent: ca.SX
-    initial: ca.SX
-    events: Events = field(default_factory=Events)
-    blocks: tuple[Block, ...] = ()
-    initial_blocks: tuple[Block, ...] = ()
-    y_start: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    g_start: ca.SX = field(
-        default_factory=lambda: ca.SX(0, 1)
-    )  # g at the guesses, where the initial values need modes
-    g_simplified: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # where homotopy() leads to
-    assertions: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    domain: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # nonzero where a function leaves its domain
-    domain_texts: tuple[str, ...] = ()
-
-    @property
-    def y(self) -> ca.SX:
-        """Unknowns of all implicit blocks."""
-        return column(b.unknown.nz[i] for b in self.blocks for i in range(b.unknown.numel()))
+INFINITE = 1e100
+"""Stands for Modelica.Constants.inf as a start value ("not yet"): sums with it have to stay finite."""
 
 
 def make_causal(flat: FlatModel) -> CausalModel:
@@ -108,13 +30,13 @@ def make_causal(flat: FlatModel) -> CausalModel:
     if flat.reinits and any(v.state_select in ("prefer", "always") for v in flat.variables.values()):
         # what else jumps at a reinit depends on the choice of states: those that the model prefers are made candidates
         try:
-            return with_domains(_Builder(flat, preferred=True).build())
+            return with_domains(Builder(flat, preferred=True).build())
         except ModelicaError:
             pass
-    return with_domains(_Builder(flat).build())
+    return with_domains(Builder(flat).build())
 
 
-class _Builder:
+class Builder:
     """Holds what the steps of one translation share."""
 
     def __init__(self, flat: FlatModel, preferred: bool = False) -> None:
@@ -148,7 +70,7 @@ class _Builder:
             symbols[name] = ca.SX.sym(name)
             self.parameters.append(variable)
         elif variable.variability == "parameter" and variable.type != "Real":
-            if isinstance(variable.binding, Term) and self._depends(variable.binding):
+            if isinstance(variable.binding, Term) and self.depends(variable.binding):
                 self.translator.inline[name] = variable.binding
             else:
                 symbols[name] = ca.SX(self._value(name))
@@ -177,7 +99,7 @@ class _Builder:
             self.unknowns.append(variable)
         else:
             self.symbols[name] = ca.SX.sym(name)
-            calculated = variable.final or self._depends(variable.binding)
+            calculated = variable.final or self.depends(variable.binding)
             (self.dependents if calculated else self.parameters).append(variable)
 
     def _from_free(self, binding: Scalar | None) -> bool:
@@ -193,14 +115,14 @@ class _Builder:
                 return True
         return False
 
-    def _depends(self, value: Scalar | None) -> bool:
+    def depends(self, value: Scalar | None) -> bool:
         """Whether a value refers to a parameter that can be set."""
         for name in referenced([value]):
             variable = self.flat.variables.get(name)
             if variable is None or (
                 variable.variability == "parameter"
                 and not variable.structural
-                and (variable.type == "Real" or variable.tunable or self._depends(variable.binding))
+                and (variable.type == "Real" or variable.tunable or self.depends(variable.binding))
             ):
                 return True
         return False
@@ -219,10 +141,10 @@ class _Builder:
                     f"{self.flat.name}: the value of {(*pending, name)[0]} depends on {name}, which has no fixed value."
                 )
             given = variable.start if variable.binding is None else variable.binding
-            self.values[name] = self._evaluate(given, (*pending, name)) or 0.0
+            self.values[name] = self.evaluate(given, (*pending, name)) or 0.0
         return self.values[name]
 
-    def _evaluate(self, value: Scalar | None, pending: tuple[str, ...] = ()) -> float | None:
+    def evaluate(self, value: Scalar | None, pending: tuple[str, ...] = ()) -> float | None:
         """Numeric value of an attribute at the default parameters, None when there is none."""
         if value is None:
             return None
@@ -243,6 +165,7 @@ class _Builder:
     # -- the steps
 
     def build(self) -> CausalModel:
+        """The model; raises ModelicaError as `make_causal` does."""
         system, translate = self.system, self.translator
         for variable in self.unknowns:
             system.add_variable(variable.name, self.symbols[variable.name], self._preference(variable))
@@ -278,7 +201,7 @@ class _Builder:
                     "(positive feedback through noEvent()), of which the exporter cannot tell the right one; let the "
                     "relation make events, or put a state (a capacity, a filter) into the loop."
                 )
-        initial = self._initial(states, initial_equations)
+        initial = initial_values(self, states, initial_equations)
         unknown = [system.symbols[n] for n in solution]
         solved = list(solution.values())
 
@@ -287,7 +210,7 @@ class _Builder:
 
         x = column([system.symbols[s] for s in states])
         shown = {name: final(expression) for name, expression in shown.items()}
-        table = _Table(self, states, solution, initial.settable, shown)
+        table = VariableTable(self, states, solution, initial.settable, shown)
         variables, algebraic, outputs = table.build()
         indicators = final(column(translate.indicators))
         return CausalModel(
@@ -305,8 +228,8 @@ class _Builder:
             w=algebraic,
             outputs=outputs,
             g=indicators,
-            g_start=self._first_indicators(indicators, x, initial),
-            g_simplified=self._simplified_indicators(initial),
+            g_start=first_indicators(self, indicators, x, initial),
+            g_simplified=simplified_indicators(self, initial),
             dependent=dependent,
             initial=initial.x,
             events=self._events(final, x, states, reinits, initial),
@@ -396,7 +319,7 @@ class _Builder:
         memory = self.memory
         return bool(memory.names or memory.samples or memory.uses_initial or self.flat.reinits)
 
-    def _events(self, final, x: ca.SX, states: list[str], reinits, initial: "_Initial") -> Events:  # type: ignore[no-untyped-def]
+    def _events(self, final, x: ca.SX, states: list[str], reinits, initial: Initial) -> Events:  # type: ignore[no-untyped-def]
         memory = self.memory
         fresh = [x.nz[i] for i in range(len(states))]
         for reinit, condition, value in reversed(reinits):
@@ -408,12 +331,13 @@ class _Builder:
             k = states.index(reinit.state)
             fresh[k] = ca.if_else(condition, value, fresh[k])
         starts = [initial.free.get(n, self._z_start(n)) for n in memory.names]
-        samples = [ca.horzcat(start, interval) for start, interval, _ in memory.samples]
+        samples = [final(ca.horzcat(start, interval)) for start, interval, _ in memory.samples]
+        held = memory.symbols() | {v.name for v in (*self.parameters, *self.dependents)}
         for times in samples:
-            if any(str(s) in memory.symbols() for s in ca.symvar(times)):
+            varying = {str(s) for s in ca.symvar(times)} - held
+            if varying:
                 raise ModelicaError(
-                    f"{self.flat.name}: a sample() whose times the initial equations determine (as from the start of "
-                    "the simulation) is a limit of this exporter."
+                    f"{self.flat.name}: the times of a sample() have to be parameters, but depend on {min(varying)}."
                 )
         return Events(
             z=tuple(memory.names),
@@ -425,35 +349,16 @@ class _Builder:
             used=self._eventful,
         )
 
-    def _first_indicators(self, indicators: ca.SX, x: ca.SX, initial: "_Initial") -> ca.SX:
-        """Event indicators at the start values, from which the search for the initial values sets out."""
-        modes = {str(mode) for mode in self.translator.modes}
-        if (
-            not initial.blocks
-            and not self.system.simplified
-            and not {str(s) for s in ca.symvar(initial.x)} & modes
-        ):
-            return ca.SX(0, 1)
-        unknown = [b.unknown.nz[i] for b in self.system.blocks for i in range(b.unknown.numel())]
-        guesses = [initial.guesses.get(n, ca.SX(0)) for b in self.system.blocks for n in b.names]
-        moved = ca.substitute([indicators], [x, column(unknown)], [initial.x_start, column(guesses)])[0]
-        return moved
-
-    def _simplified_indicators(self, initial: "_Initial") -> ca.SX:
-        """Event indicators where the way from the simplified initial system ends."""
-        if not self.system.simplified:
-            return ca.SX(0, 1)
-        symbols = {**self.symbols, **self.system.symbols}
-        known = [symbols[n] for n in initial.solution]
-        return ca.substitute([column(self.translator.indicators)], known, list(initial.solution.values()))[0]
-
     def _z_start(self, name: str) -> ca.SX:
         if name in self.split.starts:
             return self._at(self.flat.variables[name].place, Term("noEvent", (self.split.starts[name],)))
         variable = self.flat.variables.get(name)
         if variable is None:
             return self.memory.updates[name]
-        return self.translator.real(0.0 if variable.start is None else variable.start, events=False)
+        start = self.translator.real(0.0 if variable.start is None else variable.start, events=False)
+        if start.is_constant() and abs(float(start)) > INFINITE:
+            return ca.SX(math.copysign(INFINITE, float(start)))
+        return start
 
     @staticmethod
     def _preference(variable: FlatVariable) -> tuple[int, ...]:
@@ -486,171 +391,5 @@ class _Builder:
             raise ModelicaError(f"{self.flat.name}: the parameter {min(cyclic)} depends on itself.")
         return dependent
 
-    def _initial(self, states: list[str], equations: list[tuple[ca.SX, str]]) -> "_Initial":
-        """Initial values of the states, the symbols of their start values, and the starts that may be set."""
-        flat, system = self.flat.variables, self.system
-        x_start = column(ca.SX.sym(f"start({s})") for s in states)
-        required = list(equations)
-        optional: list[tuple[ca.SX, str]] = []
-        owner: dict[str, str] = {}
-        guesses: dict[str, ca.SX] = {}
-        for variable in self.unknowns:
-            name = variable.name
-            settable = name in states and not self._depends(variable.start)
-            if settable:
-                start = x_start[states.index(name)]
-            else:
-                start = self.translator.real(0.0 if variable.start is None else variable.start, events=False)
-            guesses[name] = start
-            if name not in states and variable.fixed is not True:
-                continue
-            label = f"{name} = its start value"
-            if settable:
-                owner[label] = name
-            (required if variable.fixed is True else optional).append((self.symbols[name] - start, label))
-        for variable in self.free:
-            guesses[variable.name] = self.translator.real(variable.start or 0.0, events=False)
-        free = {v.name: self.memory.values[v.name] for v in self.free}
-        result = system.solve_initial(required, optional, free, guesses, self.flat.name)
-        solution, used, blocks = result
-        values = {
-            n: self._evaluate(flat[owner[label]].start) or 0.0
-            for label in used
-            if label in owner
-            for n in [owner[label]]
-        }
-        touched = {str(s) for b in blocks for s in ca.symvar(b.guess)}
-        for index, name in enumerate(states):  # a start value that is only a guess can be set, too
-            if name not in values and str(x_start.nz[index]) in touched:
-                values[name] = self._evaluate(flat[name].start) or 0.0
-        return _Initial(
-            x_start=x_start,
-            x=column([solution[name] for name in states]),
-            settable=values,
-            blocks=blocks,
-            y_start=column([solution[n] for b in system.blocks for n in b.names]),
-            free={n: solution[n] for n in free},
-            guesses=guesses,
-            solution=solution,
-        )
 
-
-@dataclass(frozen=True)
-class _Initial:
-    """The solution of the initial equations."""
-
-    x_start: ca.SX
-    x: ca.SX
-    settable: dict[str, float]
-    blocks: tuple[Block, ...]
-    y_start: ca.SX
-    free: dict[str, ca.SX]
-    guesses: dict[str, ca.SX]
-    solution: dict[str, ca.SX]
-
-
-class _Table:
-    """Makes the table of variables."""
-
-    def __init__(
-        self,
-        builder: _Builder,
-        states: list[str],
-        solution: dict[str, ca.SX],
-        settable: dict[str, float],
-        shown: dict[str, ca.SX],
-    ) -> None:
-        self.builder, self.states, self.solution = builder, states, solution
-        self.settable, self.shown = settable, shown
-
-    def build(self) -> tuple[tuple[ModelVariable, ...], ca.SX, int]:
-        """The variables, and the column w of algebraic ones, outputs first."""
-        builder, states, solution = self.builder, self.states, self.solution
-        place: dict[int, tuple[str, int]] = {}
-        columns = (
-            ("state", [builder.system.symbols[s] for s in states]),
-            ("derivative", [solution[builder.system.derivative_name(s)] for s in states]),
-            ("input", [builder.symbols[v.name] for v in builder.inputs]),
-        )
-        for kind, entries in columns:
-            for index, expression in enumerate(entries):
-                place.setdefault(expression.element_hash(), (kind, index))
-        made: list[ModelVariable] = []
-        for kind, group in (
-            ("input", builder.inputs),
-            ("parameter", builder.parameters),
-            ("dependent", builder.dependents),
-        ):
-            made += [self._variable(v, kind, i, self._start(v, kind)) for i, v in enumerate(group)]
-        algebraic: list[ca.SX] = []
-        ordered = sorted(
-            (*builder.unknowns, *builder.discretes, *builder.free), key=lambda v: v.causality != "output"
-        )
-        outputs = 0
-        for variable in ordered:
-            name = variable.name
-            if name in states:
-                made.append(self._variable(variable, "state", states.index(name), self.settable.get(name)))
-                continue
-            expression = self._expression(name)
-            found = place.get(expression.element_hash()) if variable.causality != "output" else None
-            if found is None:
-                found = ("algebraic", len(algebraic))
-                algebraic.append(expression)
-                if variable.causality == "output":
-                    outputs += 1
-                elif not expression.is_constant():
-                    place.setdefault(expression.element_hash(), found)
-            made.append(self._variable(variable, found[0], found[1], None))
-        made += [self._derivative(index, state) for index, state in enumerate(states)]
-        return tuple(made), column(algebraic), outputs
-
-    def _expression(self, name: str) -> ca.SX:
-        if name in self.solution:
-            return self.solution[name]
-        return self.shown[name] if name in self.shown else self.builder.symbols[name]
-
-    def _derivative(self, index: int, state: str) -> ModelVariable:
-        return ModelVariable(
-            f"der({state})", "derivative", index, "local", _rate(self.builder.flat.variables[state].unit),
-            f"Time derivative of {state}", None, None, None, None,
-        )  # fmt: skip
-
-    def _start(self, variable: FlatVariable, kind: str) -> float | None:
-        if kind == "dependent":
-            return None
-        given = variable.start if variable.binding is None else variable.binding
-        return self.builder._evaluate(given) or 0.0
-
-    def _variable(self, variable: FlatVariable, kind: str, index: int, start: float | None) -> ModelVariable:
-        evaluate = self.builder._evaluate
-        return ModelVariable(
-            name=variable.name,
-            kind=kind,
-            index=index,
-            causality=variable.causality,
-            unit=variable.unit,
-            description=variable.description,
-            start=start,
-            minimum=evaluate(variable.minimum),
-            maximum=evaluate(variable.maximum),
-            nominal=evaluate(variable.nominal),
-            discrete=variable.variability == "discrete",
-        )
-
-
-def column(entries: Iterable[ca.SX]) -> ca.SX:
-    """A column of scalars that stays an SX when it is empty."""
-    listed = list(entries)
-    return ca.vertcat(*listed) if listed else ca.SX(0, 1)
-
-
-def _rate(unit: str | None) -> str | None:
-    if unit is None:
-        return None
-    if unit in ("1", ""):
-        return "1/s"
-    if "/" not in unit:
-        return "K/s" if unit == "degC" else f"{unit}/s"  # a change of temperature has no zero point
-    top, bottom = unit.split("/", 1)
-    return f"{top}/({bottom.strip('()')}.s)"
+__all__ = ["Builder", "CausalModel", "make_causal"]

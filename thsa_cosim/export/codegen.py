@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from thsa_cosim.export.causal import CausalModel, ModelVariable, column
 from thsa_cosim.export.emit import number, statements
 from thsa_cosim.export.graph import Graph
 from thsa_cosim.export.implicit import Implicit
+from thsa_cosim.export.model import CausalModel, ModelVariable, column
 
 _KINDS = ("state", "derivative", "input", "parameter", "dependent", "algebraic")
 _POINT = "double t, const double *x, const double *u, const double *p, const double *d, const double *m"
@@ -274,7 +274,7 @@ _ARGUMENTS = {
     "reinit": f"{_POINT}, double *x_new",
     "assertions": f"{_POINT}, double *a",
     "time_slopes": f"{_POINT}, double *s",
-    "samples": "const double *p, const double *d, double *s",
+    "samples": "const double *p, const double *d, const double *m, double *s",
     "directional": f"{_POINT}, const double *sx, const double *su, const double *sp, double *ddx, double *dw",
 }
 

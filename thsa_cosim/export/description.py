@@ -8,8 +8,8 @@ import casadi as ca
 
 from thsa_cosim import __version__
 from thsa_cosim.errors import ModelicaError
-from thsa_cosim.export.causal import CausalModel, ModelVariable
 from thsa_cosim.export.codegen import first_value_references, value_reference
+from thsa_cosim.export.model import CausalModel, ModelVariable
 from thsa_cosim.export.units import base_unit
 
 LOG_CATEGORIES = {

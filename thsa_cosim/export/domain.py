@@ -16,7 +16,7 @@ import casadi as ca
 from thsa_cosim.export.graph import Graph
 
 if TYPE_CHECKING:
-    from thsa_cosim.export.causal import CausalModel
+    from thsa_cosim.export.model import CausalModel
 
 _ROUNDING = 1e-12  # a relation that guards a branch lets rounding noise of this size through
 _LONGEST = 80

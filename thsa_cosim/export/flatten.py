@@ -217,7 +217,9 @@ def _chosen(file: Path, library: Library, classes: list[ClassDefinition]) -> str
     for definition in classes:
         gather(definition, definition.name)
     if not candidates:
-        raise ModelicaError(f"{file}: declares no model or block; one is needed to export.")
+        partial = [d.name for d in classes if d.kind in ("model", "block") and "partial" in d.prefixes]
+        what = f"{partial[0]} is partial" if partial else "declares no model or block"
+        raise ModelicaError(f"{file}: {what}; a complete model is needed to export.")
     stem = file.parent.name if file.name == "package.mo" else file.stem
     if stem in candidates:
         return stem

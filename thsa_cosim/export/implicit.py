@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from thsa_cosim.export.causal import CausalModel, column
 from thsa_cosim.export.emit import statements
 from thsa_cosim.export.graph import Graph
+from thsa_cosim.export.model import CausalModel, column
 from thsa_cosim.export.solve import HOMOTOPY, Block
 
 STEPS = 20  # of the way from the simplified to the actual initial system
@@ -83,7 +83,7 @@ class Implicit:
                 ]
             if self.size:
                 lines.append("  double *v = implicit_of(d);")
-                if name == "discrete_start":
+                if name == "discrete_start" and ca.depends_on(self.model.events.z_start, self.model.y):
                     lines.append("  if (solve(t, x, u, p, d, m)) return 1;")
                 lines.append("  (void)v;")
             return lines

@@ -19,7 +19,8 @@ from pathlib import Path
 from thsa_cosim.errors import ThsaCosimError
 from thsa_cosim.export.compile import Platform, compile_library, native_platform
 from thsa_cosim.export.merge_description import merged_description
-from thsa_cosim.export.merge_source import Glue, Member, layout, member_source, merged_source
+from thsa_cosim.export.merge_layout import Glue, Member, layout
+from thsa_cosim.export.merge_source import member_source, merged_source
 from thsa_cosim.system.description import SystemDescription
 from thsa_cosim.system.order import stages
 from thsa_cosim.system.structure import Component, System

@@ -5,7 +5,7 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 
-from thsa_cosim.export.merge_source import Glue, Member, input_starts
+from thsa_cosim.export.merge_layout import Glue, Member, input_starts
 from thsa_cosim.fmu.description import DefaultExperiment
 from thsa_cosim.system.structure import qualified
 

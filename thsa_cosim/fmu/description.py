@@ -4,6 +4,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import IO, Any
 from xml.etree import ElementTree
@@ -12,6 +13,7 @@ import numpy as np
 
 from thsa_cosim.errors import FmuError, did_you_mean
 from thsa_cosim.fmu.archive import open_archive, read_text, sha256_of
+from thsa_cosim.fmu.clocks import Clock, read_clocks
 
 FLOAT_TYPES = ("Real", "Float64", "Float32")
 INTEGERS = tuple(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))
@@ -66,6 +68,8 @@ class Variable:
     element: tuple[int, int, int] | None = None
     """FMI 3, one element of an array: value reference, index and length of the array; ``value_reference`` is then a
     number of our own. The array itself has its entry, but is no input, output or parameter."""
+    is_negated: bool = False
+    """FMI 1: an alias of the other sign; the FMU sets and gets the variable that it stands for."""
     is_alias: bool = False
     """FMI 3: another name of a variable that has its own entry."""
 
@@ -120,6 +124,10 @@ class FmuDescription:
     event_indicators: int = 0
     state_references: tuple[tuple[int, int], ...] = ()
     """(state, its derivative) as value references, in the order of the state vector; empty if unknown."""
+    clocks: tuple[Clock, ...] = ()
+    """FMI 3 input clocks."""
+    dimension_references: frozenset[int] = frozenset()
+    """FMI 3: value references of the structural parameters that are lengths of arrays."""
     feedthrough: Mapping[str, tuple[str, ...] | None] = field(default_factory=dict)
     """What each output depends on directly, by name (ModelStructure, FMI 2.0.4 clause 2.2.8); None: not said."""
 
@@ -141,6 +149,12 @@ class FmuDescription:
             for v in self.variables.values()
             if v.causality in ("parameter", "structuralParameter") and (v.is_scalar or v.is_alias)
         )
+
+    @cached_property
+    def structural_references(self) -> frozenset[int]:
+        """Value references of structural parameters (FMI 3)."""
+        found = (v for v in self.variables.values() if v.causality == "structuralParameter")
+        return frozenset(v.value_reference for v in found if v.element is None)
 
     def variable(self, name: str) -> Variable:
         """Return the variable ``name``; FmuError with a suggestion if there is none."""
@@ -196,7 +210,7 @@ def read_description(path: Path | str) -> FmuDescription:
         supports_co_simulation=co_simulation is not None,
         supports_model_exchange=model_exchange is not None,
         capabilities=_capabilities(model_exchange) | _capabilities(co_simulation) | _plural(xml),
-        variables=_variables(raw, intermediate),
+        variables=_negated(_variables(raw, intermediate), xml),
         default_experiment=DefaultExperiment()
         if experiment is None
         else DefaultExperiment(
@@ -211,6 +225,13 @@ def read_description(path: Path | str) -> FmuDescription:
         states=_count(raw.derivatives, raw) or int(raw.numberOfContinuousStates or 0),
         event_indicators=_count(raw.eventIndicators, raw) or int(raw.numberOfEventIndicators or 0),
         state_references=_state_references(raw),
+        clocks=read_clocks(xml),
+        dimension_references=frozenset(
+            int(d.valueReference)
+            for v in raw.modelVariables
+            for d in v.dimensions or ()
+            if d.valueReference is not None
+        ),
         feedthrough={
             unknown.variable.name: None
             if unknown.dependencies is None
@@ -291,6 +312,15 @@ def _variables(raw: Any, intermediate: set[int]) -> dict[str, Variable]:
             )
             virtual += 1
     return found
+
+
+def _negated(variables: dict[str, Variable], xml: bytes) -> dict[str, Variable]:
+    """Mark FMI 1.0's negated aliases, which fmpy does not read."""
+    if b"negatedAlias" not in xml:
+        return variables
+    elements = ElementTree.fromstring(xml).findall("ModelVariables/ScalarVariable")
+    names = {e.get("name") for e in elements if e.get("alias") == "negatedAlias"}
+    return {n: replace(v, is_negated=n in names) for n, v in variables.items()}
 
 
 def _shape(one: Any, raw: Any) -> tuple[int, ...] | None:

@@ -13,8 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from thsa_cosim.fmu.clocks import Schedule
 from thsa_cosim.fmu.cvode import Cvode
+from thsa_cosim.fmu.event_mode import handle_event
 from thsa_cosim.fmu.failure import SimulationFailure, Status
+from thsa_cosim.fmu.fmi3 import Fmi3Instance
 from thsa_cosim.fmu.instance import Instance, Phase
 from thsa_cosim.fmu.plan import Plan
 from thsa_cosim.fmu.segments import MERGED, segments, time_slack
@@ -65,6 +68,9 @@ class _Run:
         self.next_row = 0
         self.next_event: float | None = None
         self.ends = False
+        self.schedule: Schedule | None = None
+        if isinstance(instance, Fmi3Instance) and description.clocks:
+            self.schedule = Schedule(instance, description.clocks, float(plan.grid.times[0]))
         self._z = np.zeros(self.nz)
         self.point = instance.point(plan.input_channels)
 
@@ -132,16 +138,13 @@ class _Run:
         return self.rtol * np.where(usable, np.abs(nominal), 1.0)
 
     # -- events ---------------------------------------------------------------------------------------
-    def iterate_events(self) -> None:
-        """Event iteration in Event Mode, then on to Continuous-Time Mode."""
-        for _ in range(_EVENTS_AT_ONE_TIME):
-            info = self.instance.event_iteration()
-            self.ends |= info.terminate
-            self.next_event = info.next_event_time
-            if self.ends or not info.needs_update:
-                break
-        else:
-            raise SimulationFailure(Status.FMI_ERROR, "the event iteration does not come to an end")
+    def iterate_events(self, time: float) -> None:
+        """Event iteration in Event Mode, clocks that are due included, then on to Continuous-Time Mode."""
+        terminate, self.next_event = handle_event(self.instance, self.schedule, time)
+        self.ends |= terminate
+        if self.schedule is not None and np.isfinite(self.schedule.next):
+            own = np.inf if self.next_event is None else self.next_event
+            self.next_event = min(own, self.schedule.next)
         self.instance.enter_continuous_time_mode()
 
     def event(self, time: float, solver: Cvode) -> None:
@@ -149,7 +152,7 @@ class _Run:
         self.instance.enter_event_mode()
         if self.plan.input_channels:
             self.apply_inputs(time)
-        self.iterate_events()
+        self.iterate_events(time)
         solver.restart(time, self.states(), self.absolute_tolerance())
 
     # -- the loop -------------------------------------------------------------------------------------
@@ -163,7 +166,9 @@ class _Run:
         if self.plan.input_channels:
             self.apply_inputs(t)
         instance.initialize_end()
-        self.iterate_events()
+        if self.schedule is not None:
+            self.schedule.begin()
+        self.iterate_events(t)
         self.progress[0] = Phase.STEP
         solver = Cvode(
             t,

@@ -105,6 +105,7 @@ def run_fmi1(
 def _set(slave: Any, variables: Sequence[Variable], values: Any) -> None:
     for variable, value in zip(variables, values, strict=True):
         kind = _TYPES[variable.type]
+        value = -value if _is_negated(variable) else value
         number: Any = float(value) if kind == "Real" else bool(value) if kind == "Boolean" else int(value)
         getattr(slave, f"set{kind}")([variable.value_reference], [number])
 
@@ -112,4 +113,10 @@ def _set(slave: Any, variables: Sequence[Variable], values: Any) -> None:
 def _get(slave: Any, variable: Variable) -> float:
     (value,) = getattr(slave, f"get{_TYPES[variable.type]}")([variable.value_reference])
     # fmpy hands Booleans over as bytes.
-    return float(value != b"\0") if isinstance(value, bytes) else float(value)
+    if isinstance(value, bytes):
+        return float(value != b"\0")
+    return -float(value) if _is_negated(variable) else float(value)
+
+
+def _is_negated(variable: Variable) -> bool:
+    return variable.is_negated and variable.type != "Boolean"

@@ -54,6 +54,8 @@ class Fmi2Instance(Instance):
         "Boolean": ("Boolean", np.int32),
     }
 
+    step_types = (ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
+
     def instantiate(self) -> None:
         """Call fmi2Instantiate."""
         callbacks = shared_callbacks()
@@ -97,6 +99,15 @@ class Fmi2Instance(Instance):
         """fmi2DoStep; SimulationFailure also where the FMU discards the step."""
         arguments = (ctypes.c_double, time), (ctypes.c_double, step), (ctypes.c_int, 1)
         self.call("DoStep", *arguments, time=time)
+
+    def part_of_step(self, time: float, step: float) -> float | None:
+        """fmi2DoStep; after fmi2Discard the last time that it reached."""
+        code = self.library.function("fmi2DoStep", *self.step_types)(self.handle, time, step, 1)
+        if code == 2:
+            terminated, last = self.asked_to_stop()
+            return None if terminated else last
+        self.check(code, "DoStep", time)
+        return time + step
 
     def value_function(self, verb: str, suffix: str) -> Any:
         """fmi2SetReal, fmi2GetInteger, ..."""

@@ -108,6 +108,7 @@ def input_modes(description: FmuDescription, linear: Sequence[Variable]) -> tupl
     if (
         description.fmi_version == "3.0"
         and description.capabilities.get("providesIntermediateUpdate")
+        and not description.clocks
         and all(v.intermediate_update and v.type == "Float64" for v in linear)
     ):
         modes.append("intermediate")

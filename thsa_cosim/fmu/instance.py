@@ -57,6 +57,13 @@ class Channel:
     dtype: np.dtype[Any]
     columns: tuple[int, ...]
     """Position of each variable in the caller's list."""
+    signs: FloatArray | None = None
+    """(n,) -1 for FMI 1.0's negated aliases; None where there are none."""
+
+
+def _signs(variables: Sequence[Variable]) -> FloatArray | None:
+    negated = [v.is_negated and v.type != "Boolean" for v in variables]
+    return np.where(negated, -1.0, 1.0) if any(negated) else None
 
 
 class Instance(ABC):
@@ -65,6 +72,8 @@ class Instance(ABC):
     prefix: str
     types: ClassVar[dict[str, tuple[str, Any]]]
     """FMI data type -> (function suffix, numpy type)"""
+    step_types: ClassVar[tuple[Any, ...]] = ()
+    """Prototype of doStep."""
 
     def __init__(
         self, folder: Path, description: FmuDescription, kind: str, sink: MessageSink | None = None
@@ -106,6 +115,11 @@ class Instance(ABC):
     @abstractmethod
     def do_step(self, time: float, step: float) -> None:
         """Go from ``time`` to ``time + step`` [s] (Co-Simulation), inputs as they were last set."""
+
+    def part_of_step(self, time: float, step: float) -> float | None:
+        """Like ``do_step``, where less may be done; the time [s] that was reached, None if that is not known."""
+        self.do_step(time, step)
+        return time + step
 
     @abstractmethod
     def value_function(self, verb: str, suffix: str) -> Any:
@@ -154,6 +168,7 @@ class Instance(ABC):
                 np.array([variables[c].value_reference for c in columns], dtype=np.uint32),
                 dtypes[suffix],
                 tuple(columns),
+                _signs([variables[c] for c in columns]),
             )
             for suffix, columns in groups.items()
         ]
@@ -161,7 +176,10 @@ class Instance(ABC):
     def set_values(self, channels: Sequence[Channel], values: FloatArray) -> None:
         """Set variables to ``values`` (n,), one C call per data type."""
         for channel in channels:
-            data = np.ascontiguousarray(values[list(channel.columns)]).astype(channel.dtype)
+            wanted = values[list(channel.columns)]
+            if channel.signs is not None:
+                wanted = wanted * channel.signs
+            data = np.ascontiguousarray(wanted).astype(channel.dtype)
             function = self.value_function("Set", channel.suffix)
             code = self.access(function, channel.references.ctypes.data, len(data), data.ctypes.data)
             self.check(code, f"Set{channel.suffix}")
@@ -173,7 +191,7 @@ class Instance(ABC):
             function = self.value_function("Get", channel.suffix)
             code = self.access(function, channel.references.ctypes.data, len(data), data.ctypes.data)
             self.check(code, f"Get{channel.suffix}")
-            out[list(channel.columns)] = data
+            out[list(channel.columns)] = data if channel.signs is None else data * channel.signs
 
     def set_start(self, channels: Sequence[Channel], values: FloatArray) -> None:
         """Set start values of a new or reset instance.

@@ -12,6 +12,7 @@ from thsa_cosim.closing import Closing
 from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.description import FmuDescription, read_description
+from thsa_cosim.fmu.event_mode import needs_events, step_with_events
 from thsa_cosim.fmu.fmi1_exchange import Fmi1Exchange
 from thsa_cosim.fmu.fmi2 import Fmi2Instance
 from thsa_cosim.fmu.fmi3 import Fmi3Instance
@@ -61,7 +62,7 @@ class Plant(Closing):
         """Take an FMU that is already unpacked into ``folder``; ``Plant.open`` is the usual way in.
 
         ``scratch`` holds ``folder`` and is removed by ``close``. ``progress`` (4,) is written while running:
-        phase, time [s], step, unused.
+        phase, time [s], step, number of the component of a system that is at work (from 1; 0: none).
         """
         self.description = description
         self.folder = folder
@@ -265,6 +266,8 @@ class Plant(Closing):
         instance.initialize_end()
         if free and tolerance is not None:
             signals = follow(instance, plan, self.progress, tolerance)
+        elif isinstance(instance, Fmi3Instance) and instance.event_mode:
+            signals = step_with_events(instance, plan, self.progress)
         else:
             signals = step_through(instance, plan, self.progress, self.backend == "compiled")
         self.progress[0] = Phase.TERMINATE
@@ -311,6 +314,7 @@ class Plant(Closing):
     def _prepare_callback(self, instance: Instance, plan: Plan) -> None:
         if not isinstance(instance, Fmi3Instance) or self.kind != "co-simulation":
             return
+        instance.event_mode = needs_events(self.description, self.kind)
         in_one_call = self.stepping == "free" and is_offered(instance)
         if plan.mode != "intermediate" or plan.smooth is None or in_one_call:
             instance.intermediate_update, instance.intermediate_references = 0, ()

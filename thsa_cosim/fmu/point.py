@@ -59,7 +59,7 @@ class InstancePoint:
             if code := self._set_states(instance.handle, self._x_address, n):
                 instance.check(code, "SetContinuousStates", time)
         for channel, buffer, columns, setter in self._continuous:
-            buffer[:] = inputs[columns]
+            buffer[:] = inputs[columns] if channel.signs is None else inputs[columns] * channel.signs
             code = instance.access(setter, channel.references.ctypes.data, len(buffer), buffer.ctypes.data)
             if code:
                 instance.check(code, f"Set{channel.suffix}", time)

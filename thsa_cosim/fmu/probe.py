@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from thsa_cosim.fmu.archive import open_archive
-from thsa_cosim.fmu.description import FmuDescription, Variable
+from thsa_cosim.fmu.description import NUMBERS, FmuDescription, Variable
 from thsa_cosim.fmu.native import LIBRARY_SUFFIX, platform_folders
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -146,16 +146,20 @@ def halved(time: FloatArray) -> FloatArray:
 
 
 def observed(description: FmuDescription) -> tuple[str, ...]:
-    """Return the names to compare: numeric outputs, or local variables where there are no outputs."""
-    for causality in ("output", "local"):
-        names = [
-            v.name
-            for v in description.variables.values()
-            if v.causality == causality and v.is_float and not v.is_array and v.variability != "constant"
-        ]
-        if names:
-            return tuple(names[:_OUTPUTS])
-    return ()
+    """Return the names to compare: numbers that are outputs; where there are none states, or local variables.
+
+    Whole numbers and Booleans are compared where no output is a floating-point number.
+    """
+    variables = [v for v in description.variables.values() if v.is_scalar and v.variability != "constant"]
+    outputs = [v for v in variables if v.causality == "output"]
+    states = {reference for reference, _ in description.state_references}
+    choices = (
+        [v for v in outputs if v.is_float],
+        [v for v in outputs if v.type in NUMBERS],
+        [v for v in variables if v.is_float and v.value_reference in states and v.element is None],
+        [v for v in variables if v.is_float and v.causality == "local"],
+    )
+    return next((tuple(v.name for v in choice[:_OUTPUTS]) for choice in choices if choice), ())
 
 
 def raised_inputs(description: FmuDescription, time: FloatArray) -> Signals | None:
@@ -176,12 +180,8 @@ _KNOTS = (
 
 
 def excitable(description: FmuDescription) -> tuple[Variable, ...]:
-    """Inputs that can run linearly, and that need a signal."""
-    return tuple(
-        v
-        for v in description.inputs
-        if v.is_float and not v.is_array and v.variability == "continuous" and not v.may_stay_open
-    )
+    """Floating-point inputs that need a signal; discrete ones are held from one communication point to the next."""
+    return tuple(v for v in description.inputs if v.is_float and not v.is_array and not v.may_stay_open)
 
 
 def kinked_inputs(

@@ -135,31 +135,51 @@ class Tables:
             address, references = instance.library.address(function), channel.references
             row = address, references.ctypes.data, len(references), orders.ctypes.data
             self.slopes[:] = *row, table.ctypes.data, table.strides[0]
-        self.do_step = instance.library.address(instance.library.function(f"{instance.prefix}DoStep"))
+        self.do_step = instance.library.address(
+            instance.library.function(f"{instance.prefix}DoStep", *instance.step_types)
+        )
         self.flags, self.last = np.zeros(8, dtype=np.uint8), np.zeros(1)
         self.signals: Signals | None = None
 
     def advance(
-        self, loop: Any, instance: Instance, plan: Plan, progress: FloatArray
+        self, loop: Any, instance: Instance, plan: Plan, progress: FloatArray, first: int = 0
     ) -> tuple[int, int, int]:
-        """Call ``advance_python`` or its compiled twin."""
+        """Call ``advance_python`` or its compiled twin, from communication point number ``first`` on."""
         version = 2 if instance.prefix == "fmi2" else 3
+        slopes = self.slopes.copy()
+        slopes[4] += first * slopes[5]
         done, what, code = loop(
             version,
             instance.handle,
             self.do_step,
-            plan.grid.times,
-            plan.grid.steps,
-            self.sets,
-            self.slopes,
-            self.ends,
-            self.gets,
-            self.floats,
+            plan.grid.times[first:],
+            plan.grid.steps[first:],
+            _from_row(self.sets, first),
+            slopes,
+            _from_row(self.ends, first),
+            _from_row(self.gets, first),
+            self.floats[first:],
             self.flags,
             self.last,
             progress,
         )
-        return int(done), int(what), int(code)
+        return first + int(done), int(what), int(code)
+
+    def read(self, instance: Instance, plan: Plan, k: int) -> None:
+        """Read the outputs at communication point ``k``; SimulationFailure if one is not finite."""
+        for channel, table in self.results:
+            getter = instance.value_function("Get", channel.suffix)
+            references = channel.references
+            code = instance.access(getter, references.ctypes.data, len(references), table[k].ctypes.data)
+            instance.check(code, f"Get{channel.suffix}")
+        _refuse_not_finite(plan, self.results, k)
+
+
+def _from_row(table: IntArray, first: int) -> IntArray:
+    """An address table whose value tables begin ``first`` rows later."""
+    later = table.copy()
+    later[:, 3] += first * later[:, 4]
+    return later
 
 
 def step_through(instance: Instance, plan: Plan, progress: FloatArray, compiled: bool) -> Signals:
@@ -167,26 +187,21 @@ def step_through(instance: Instance, plan: Plan, progress: FloatArray, compiled:
     if plan.tables is None:
         plan.tables = Tables(instance, plan)
     tables: Tables = plan.tables
-    for channel, first in tables.results:
-        getter = instance.value_function("Get", channel.suffix)
-        references = channel.references
-        code = instance.access(getter, references.ctypes.data, len(references), first.ctypes.data)
-        instance.check(code, f"Get{channel.suffix}")
-    _refuse_not_finite(plan, tables.results, 0)
+    tables.read(instance, plan, 0)
     progress[0] = Phase.STEP
     if compiled:
         from thsa_cosim.fmu.compiled import advance as loop
     else:
         loop = advance_python
     done, what, code = tables.advance(loop, instance, plan, progress)
-    if what and _ends_with_the_run(instance, plan, tables, done, what, code):
-        for channel, table in tables.results:
-            getter = instance.value_function("Get", channel.suffix)
-            row = table[done + 1].ctypes.data
-            access = instance.access(getter, channel.references.ctypes.data, len(channel.references), row)
-            instance.check(access, f"Get{channel.suffix}")
-        _refuse_not_finite(plan, tables.results, done + 1)
-    elif what:
+    while what and _completed(instance, plan, tables, done, what, code):
+        _apply(instance, plan.end, done + 1)
+        tables.read(instance, plan, done + 1)
+        if done + 1 == len(plan.grid.steps):
+            what = 0
+            break
+        done, what, code = tables.advance(loop, instance, plan, progress, done + 1)
+    if what:
         _explain(instance, plan, tables.results, done, what, code)
     if tables.singles:  # the loop looks at doubles only
         for k in range(len(plan.grid.times)):
@@ -204,6 +219,46 @@ def step_through(instance: Instance, plan: Plan, progress: FloatArray, compiled:
     signals = copy.copy(tables.signals)
     object.__setattr__(signals, "values", values)
     return signals
+
+
+_PARTS = 1000
+"""Parts in which an FMU may do one communication step."""
+
+
+def _completed(instance: Instance, plan: Plan, tables: Tables, done: int, what: int, code: int) -> bool:
+    """Go on from where the FMU stopped within a step (fmi2Discard, an early return); whether its end was reached."""
+    if _ends_with_the_run(instance, plan, tables, done, what, code):
+        return True
+    if plan.smooth is not None:  # slopes count from the begin of the step
+        return False
+    begin, end = float(plan.grid.times[done]), float(plan.grid.times[done] + plan.grid.steps[done])
+    slack = 1e-9 * (end - begin)
+    last: float | None = None
+    if what == 3 and code == 2 and isinstance(instance, Fmi2Instance):
+        terminated, last = instance.asked_to_stop()
+        last = None if terminated else last
+    elif what == 8:
+        last = float(tables.last[0])
+    at = begin
+    for _ in range(_PARTS):
+        if last is None or not at + slack < last <= end + slack:
+            return False
+        at = last
+        if at >= end - slack:
+            return True
+        try:
+            last = instance.part_of_step(at, end - at)
+        except SimulationFailure:
+            return False
+    return False
+
+
+def _apply(instance: Instance, rows: Sequence[tuple[Channel, NDArray[Any]]], k: int) -> None:
+    """Set the inputs of communication point ``k``."""
+    for channel, table in rows:
+        setter, references = instance.value_function("Set", channel.suffix), channel.references
+        code = instance.access(setter, references.ctypes.data, len(references), table[k].ctypes.data)
+        instance.check(code, f"Set{channel.suffix}")
 
 
 def _ends_with_the_run(

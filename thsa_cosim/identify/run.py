@@ -25,7 +25,16 @@ from thsa_cosim.identify.problem import (
 )
 from thsa_cosim.identify.results import ForceBalance, IdentifyResult, LawResult, PointResult
 from thsa_cosim.identify.silent import note_on, silent_parameters
-from thsa_cosim.inspection import Finding, Inspection, Residual, hidden_gains, judge, misfits
+from thsa_cosim.inspection import (
+    Expected,
+    Finding,
+    Inspection,
+    Residual,
+    hidden_gains,
+    influences,
+    judge,
+    misfits,
+)
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario
 from thsa_cosim.search import EvolutionSettings, Generation
@@ -268,7 +277,7 @@ class _Search:
             data=Inspection.of((*scenario.data.findings, *slips), scenario.data.repairs),
             trust=judge(
                 self._residuals(),
-                (*_reasons(slips), *self._bounds(), *self._coupled()),
+                (*_reasons(slips), *self._undetermined(), *self._bounds(), *self._coupled()),
             ),
             coupling=self._coupling,
         )
@@ -288,27 +297,31 @@ class _Search:
     def _slips(self) -> list[Finding]:
         """What one slip of one signal would explain of what the fit leaves, beyond what is known of the data."""
         known = {(f.recording, f.channel, f.kind) for f in self._scenario.data.findings}
-        found = [
-            f
-            for k in sorted(self._found)
-            for f in misfits(self._point_residuals(k), self._scenario.file_units)
-        ]
-        found = [f for f in found if (f.recording, f.channel, f.kind) not in known]
-        doubted = {f.channel for f in found}
-        return found + [f for f in self._hidden() if f.channel not in doubted]
+        found = []
+        for k in sorted(self._found):
+            residuals, expected = self._point_residuals(k), self._expected(k)
+            slips = misfits(residuals, self._scenario.file_units) or influences(residuals, expected)
+            doubted = {f.channel for f in slips}
+            found += slips + [f for f in hidden_gains(residuals, expected) if f.channel not in doubted]
+        return [f for f in found if (f.recording, f.channel, f.kind) not in known]
 
-    def _hidden(self) -> list[Finding]:
-        """Gains of sensors that the fit cannot see, where the parameters differ from the drawing in that way."""
-        spec = self._scenario
-        found: list[Finding] = []
-        for k, search in sorted(self._found.items()):
-            if search.result is not None and search.jacobian is not None:
-                own = expected_values(search.result, self._points[k].space, spec.laws, spec.fmu, spec.zeroed)
-                found += hidden_gains(self._point_residuals(k), own)
-        return found
+    def _expected(self, index: int) -> list[Expected]:
+        """What was identified at a point beside what the drawing says; empty without a Jacobian."""
+        spec, search = self._scenario, self._found[index]
+        if search.result is None or search.jacobian is None:
+            return []
+        return expected_values(search.result, self._points[index].space, spec.laws, spec.fmu, spec.zeroed)
 
     def _coupled(self) -> list[str]:
         return [] if self._coupling is None or not self._coupling.reason else [self._coupling.reason]
+
+    def _undetermined(self) -> list[str]:
+        """Points where no parameter is determined: whatever fits, it says nothing."""
+        return [
+            f"the recordings determine no parameter at {point.label}: they are too short, or nothing in them shows it"
+            for point in self._results()
+            if point.parameters and not any(e.identifiable for e in point.parameters.values())
+        ]
 
     def _bounds(self) -> list[str]:
         """Parameters that ended on a bound: the fit would have gone on."""

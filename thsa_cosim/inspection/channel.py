@@ -22,10 +22,12 @@ _SILENT = 1e-5
 _WINDOW, _LEAST_WINDOWS = 64, 6
 _DITHERED = 0.7
 """Noise, in quantisation steps, that no moving signal on a lattice makes up by itself."""
+_TURNING = 0.5
+"""Share of bends that turn the one before back, from which on they are noise."""
 _MOST_SPANS = 40
 _STRAIGHT, _DRAWN = 1e-6, 0.95
 """Bend in shares of the range that is rounding, and share of such samples that make a signal a schedule."""
-_JUMP, _OFTEN = 0.02, 0.05
+_JUMP, _OFTEN = 0.02, 0.15
 """Change of a command from sample to sample, in shares of its range, that is a jump; share of samples that are none."""
 _ANSWER = 4.5
 """Samples after a jump of a command that may stand out: a voltage at a step of the speed."""
@@ -114,10 +116,17 @@ class Channel:
         return np.asarray(np.median(windows[moving], axis=1) / (0.67449 * np.sqrt(6.0)))
 
     @cached_property
+    def _alternates(self) -> bool:
+        """Whether it bends to and fro, as white noise does (73 % of the bends turn back), and no smooth schedule."""
+        bends = np.diff(self.plain[self.fresh_index], 2)
+        turns = bends[1:] * bends[:-1]
+        return bool(np.sum(turns < 0.0) > _TURNING * np.sum(turns != 0.0))
+
+    @cached_property
     def steady(self) -> bool:
         """Whether the noise is a sensor's: there in every window, whatever the signal does, and dithers the levels."""
         profile = self.profile
-        if self.silent or profile.size < _LEAST_WINDOWS:
+        if self.silent or profile.size < _LEAST_WINDOWS or not self._alternates:
             return False
         middle = float(np.median(profile))
         low, high = np.quantile(profile, (0.2, 0.8))

@@ -10,6 +10,7 @@ from thsa_cosim.inspection.channel import Channel
 from thsa_cosim.inspection.course import moving_start, temperature_drift, unequal_noise
 from thsa_cosim.inspection.finding import Finding, Inspection
 from thsa_cosim.inspection.jumps import jump_times, jumps
+from thsa_cosim.inspection.levels import dead_band, stuck_bit
 from thsa_cosim.inspection.outliers import outliers
 from thsa_cosim.inspection.pairs import pair_findings
 from thsa_cosim.inspection.samples import dependent_samples, resolution, sentinels
@@ -27,6 +28,8 @@ CHANNEL_DETECTORS: tuple[Callable[[Channel], Iterator[Finding]], ...] = (
     clipped,
     stuck,
     repeated,
+    stuck_bit,
+    dead_band,
     outliers,
     jumps,
     hum,
@@ -34,7 +37,7 @@ CHANNEL_DETECTORS: tuple[Callable[[Channel], Iterator[Finding]], ...] = (
     temperature_drift,
     moving_start,
 )
-_OF_WRAPS = ("spikes", "dropouts", "interpolated-samples", "held-samples", "unequal-noise")
+_OF_WRAPS = ("spikes", "dropouts", "interpolated-samples", "held-samples", "unequal-noise", "clipped")
 """What a counter that wraps looks like besides."""
 _LEAST = 16
 _ROUNDING = 1e-7

@@ -21,6 +21,8 @@ _ABOVE = 2.0
 """Quantisation steps of noise from which on a value that repeats is no chance."""
 _SKIPPED, _VISITED = 2.0, 0.5
 """Usual change in quantisation steps, and share of the levels visited, that make a signal a schedule of set points."""
+_MOVES = 4.0
+"""Steps over its range that a signal has to make to be one."""
 _LEVELS = 100
 """A signal that is met by fewer levels than this over its range is coarse, if no noise dithers them."""
 
@@ -129,7 +131,8 @@ def resolution(channel: Channel) -> Iterator[Finding]:
         f"{channel.name} is resolved to {channel.number(step)}, {levels:.0f} steps over its range, with too little"
         f" noise to dither them"
     )
-    yield channel.finding("coarse-resolution", "warning", text)
+    # What hardly moves says little at any resolution: a temperature that stays.
+    yield channel.finding("coarse-resolution", "warning" if levels >= _MOVES else "note", text)
 
 
 def sentinels(channel: Channel) -> Iterator[Finding]:

@@ -20,6 +20,8 @@ _STRUCTURE = 0.3
 """Share of the residual's power that neighbours account for."""
 _FOLLOWS = 0.1
 """Share that an input, or how it changes, accounts for."""
+_DEPENDS, _LEVELS, _LEAST_LEVELS = 0.04, 16, 30
+"""Share that the signal's own size accounts for; by how many levels of it, of how many samples at least."""
 _LAGS = 20
 _MOST_REASONS = 12
 
@@ -28,8 +30,9 @@ _MOST_REASONS = 12
 class Residual:
     """What is left of ``channel`` in one recording: simulated less measured over noise, (n,), dimensionless.
 
-    ``inputs``: by name, (n,) at the same samples. ``noise``: 1 σ in ``unit``. For ``misfits`` also ``time`` (n,) s,
-    ``simulated`` (n,) in ``unit``, and ``slopes`` (n, p): how the values follow each parameter, in any scale.
+    ``inputs``: by name, (n,) at the same samples; ``held``: those that stay from one sample to the next. ``noise``: 1 σ
+    in ``unit``. For ``misfits`` also ``time`` (n,) s, ``simulated`` (n,) in ``unit``, and ``slopes`` (n, p): how the
+    values follow each parameter, in any scale.
     """
 
     recording: str
@@ -41,6 +44,7 @@ class Residual:
     time: FloatArray = field(default_factory=lambda: np.empty(0))
     simulated: FloatArray = field(default_factory=lambda: np.empty(0))
     slopes: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    held: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -102,6 +106,12 @@ def _channel(channel: str, own: Sequence[Residual]) -> list[str]:
         reasons.append(
             f"what is left of {channel} follows {name}, which accounts for {100 * share:.0f} % of it"
         )
+    levels = max((_depends(r) for r in own), default=0.0)
+    if levels > 0.0 and not follows:
+        reasons.append(
+            f"what is left of {channel} depends on its own size, which accounts for {100 * levels:.0f} % of it: a"
+            " sensor that is not linear, or a missing effect"
+        )
     return reasons
 
 
@@ -121,6 +131,25 @@ def _predictable(values: FloatArray) -> float:
     # Of white noise neighbours say nothing; fitted by one coefficient, what they account for is a correlation.
     both = float(np.sum(values * sums))
     return max(0.0, both) ** 2 / (power * float(np.sum(sums**2)) + 1e-300)
+
+
+def _depends(residual: Residual) -> float:
+    """Share of the residual's power that its mean over like simulated values accounts for; 0 below the limit.
+
+    A lack-of-fit test: samples of like values repeat each other. ``values`` (n,) are white where the fit is right.
+    """
+    values, simulated = residual.values, residual.simulated
+    power = float(np.sum(values**2))
+    if values.size < _LEAST_LEVELS * _LEVELS or simulated.size != values.size or power <= 0.0:
+        return 0.0
+    ends = np.quantile(simulated, np.linspace(0.0, 1.0, _LEVELS + 1)[1:-1])
+    level = np.searchsorted(ends, simulated, side="right")
+    counts = np.bincount(level, minlength=_LEVELS)
+    sums = np.bincount(level, values, minlength=_LEVELS)[counts > 0]
+    between = float(np.sum(sums**2 / counts[counts > 0]))
+    # Between m levels, white noise has m variances, with a standard deviation of sqrt(2 m).
+    chance = (_LEVELS + 8.0 * np.sqrt(2.0 * _LEVELS)) * power / values.size
+    return between / power if between > max(_DEPENDS * power, chance) else 0.0
 
 
 def _follows(residual: Residual) -> tuple[float, str] | None:

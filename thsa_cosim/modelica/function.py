@@ -9,11 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 from thsa_cosim.modelica import builtin, tables
-from thsa_cosim.modelica.arrays import Record, Value, each, fill
+from thsa_cosim.modelica.arrays import Record, Value, each, fill, shape
 from thsa_cosim.modelica.evaluate import Evaluator
-from thsa_cosim.modelica.scope import BUILTIN_TYPES, Element, Scope, resolved
+from thsa_cosim.modelica.redeclaration import resolved
+from thsa_cosim.modelica.scope import BUILTIN_TYPES, Element, Scope
 from thsa_cosim.modelica.statements import UNSET, Statements, UnknownStepsError
-from thsa_cosim.modelica.syntax import Component, Syntax
+from thsa_cosim.modelica.syntax import Component, Equation, Syntax
 from thsa_cosim.modelica.terms import Enumeration
 
 
@@ -60,8 +61,46 @@ def invoke(
         return _External(target, positional, keyed, evaluator, where).call()
     if "partial" in scope.definition.prefixes:
         raise evaluator.error(where, f"the function {target.qualified} is partial: it has to be redeclared.")
+    mapped = _vectorized(target, positional, keyed, evaluator, where)
+    if mapped is not None:
+        calls = [invoke(evaluator, target, list(p), k, where) for p, k in mapped]
+        several = bool(calls) and isinstance(calls[0], tuple)
+        return tuple(list(part) for part in zip(*calls, strict=True)) if several else calls
     run = _Run(target, positional, keyed, evaluator, where)
     return run.call()
+
+
+def _vectorized(
+    target: Scope, positional: list[Value], keyed: dict[str, Value], evaluator: Evaluator, where: Syntax
+) -> list[tuple[list[Value], dict[str, Value]]] | None:
+    """Arguments of each call where some are arrays of what the function takes (Modelica Language Specification 3.6,
+    12.4.6); None where they fit as they are.
+    """
+    inputs = [(name, e) for name, e in _declared(target) if "input" in e.declaration.prefixes]
+    given = dict(zip((name for name, _ in inputs), positional, strict=False)) | keyed
+    extra = {
+        name: given[name]
+        for name, element in inputs
+        if isinstance(given.get(name), list) and len(shape(given[name])) > _rank(element)
+    }
+    if not extra or len(positional) > len(inputs):
+        return None
+    sizes = {len(value) for value in extra.values()}
+    if len(sizes) > 1:
+        raise evaluator.error(where, f"{target.qualified}() gets arrays of different sizes.")
+    names = [name for name, _ in inputs[: len(positional)]]
+    turns = []
+    for k in range(sizes.pop()):
+        here = {name: value[k] if name in extra else value for name, value in given.items()}
+        turns.append(([here[n] for n in names], {n: v for n, v in here.items() if n not in names}))
+    return turns
+
+
+def _rank(element: Element) -> int:
+    """Dimensions of a declaration with those of its type."""
+    declaration, owner, _ = resolved(element)
+    target = None if declaration.type in BUILTIN_TYPES else owner.find_class(declaration.type)
+    return len(declaration.dimensions) + (len(target.definition.dimensions) if target else 0)
 
 
 def _implementation(target: Scope) -> Scope:
@@ -208,10 +247,25 @@ class _Run:
             env = runner.run(statements, self.env)
         finally:
             self.caller.scope.world.__dict__["calls"].pop()
+        for name in self.outputs:
+            if name in runner.partly and not any(_asserts(s) for s in statements):
+                what = f"{self.target.qualified}() gives {name} no value in one of its branches"
+                self.caller.warn(
+                    self.where, f"{what}; that of another branch is taken, Modelica leaves it open."
+                )
         results = tuple(env[name] for name in self.outputs)
         if not results:
             return ()
         return results[0] if len(results) == 1 else results
+
+
+def _asserts(statement: Any) -> bool:
+    """Whether a statement, or one inside it, is an assertion: what follows a failed one does not matter."""
+    if isinstance(statement, Equation) and statement.op == "call":
+        return bool(statement.args[0].args[0] == "assert")
+    if isinstance(statement, Syntax) or not isinstance(statement, tuple):
+        return False
+    return any(_asserts(part) for part in statement)
 
 
 def _names_in(expression: Any) -> set[str]:

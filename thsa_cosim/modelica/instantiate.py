@@ -9,7 +9,8 @@ from thsa_cosim.errors import ModelicaError
 from thsa_cosim.modelica.arrays import shape
 from thsa_cosim.modelica.evaluate import Evaluator, bound
 from thsa_cosim.modelica.modifier import Binding, Modifier, element_of, merge, spread
-from thsa_cosim.modelica.scope import BUILTIN_TYPES, DISABLED, Element, Scope, Variable, resolved
+from thsa_cosim.modelica.redeclaration import resolved
+from thsa_cosim.modelica.scope import BUILTIN_TYPES, DISABLED, Element, Scope, Variable
 from thsa_cosim.modelica.syntax import Component, Syntax
 
 ATTRIBUTES = frozenset(

@@ -13,12 +13,10 @@ from typing import Any, NamedTuple
 from thsa_cosim.errors import ModelicaError, did_you_mean
 from thsa_cosim.modelica.library import Library
 from thsa_cosim.modelica.modifier import Binding, Modifier, merge, modifier
+from thsa_cosim.modelica.redeclaration import check_replaceable, constraint
 from thsa_cosim.modelica.syntax import ClassDefinition, Component, Extends, Import
 
 BUILTIN_TYPES = frozenset(("Real", "Integer", "Boolean", "String", "ExternalObject", "Clock"))
-_TYPE_PREFIXES = frozenset(
-    ["flow", "stream", "discrete", "parameter", "constant", "input", "output", "inner", "outer"]
-)
 _LITERALS = {
     "StateSelect": ("never", "avoid", "default", "prefer", "always"),
     "AssertionLevel": ("error", "warning"),
@@ -338,10 +336,10 @@ class Scope:
                     f"{scope.place(replacement.line)}: {declaration.name} is a class, not a component."
                 )
             rest = Modifier(None, given.children)
-            constraint = _constraint(declaration, owner)
+            limits = constraint(declaration, owner)
             if replacement.extending:
                 original = (declaration, owner)
-                return Scope(self.world, replacement, scope, merge(rest, constraint), original=original)
+                return Scope(self.world, replacement, scope, merge(rest, limits), original=original)
             check_replaceable(element, scope, replacement)
             if replacement.name == replacement.base:  # redeclare model A = A: the outer A
                 outside = scope.parent or scope
@@ -349,7 +347,7 @@ class Scope:
                 if target is not None:
                     inner = merge(modifier(replacement.arguments, None, scope), target.given)
                     return Scope(self.world, target.definition, target.parent, merge(rest, inner))
-            return Scope(self.world, replacement, scope, merge(rest, constraint))
+            return Scope(self.world, replacement, scope, merge(rest, limits))
         return Scope(self.world, declaration, owner, given)
 
     # -- components
@@ -385,71 +383,3 @@ class Scope:
         if found is None:
             raise self.unknown_class(base, line)
         return found
-
-
-def _constraint(declaration: Component | ClassDefinition, owner: Scope) -> Modifier | None:
-    """What a replaceable element says about everything that replaces it."""
-    if declaration.constraint is not None:
-        return modifier(declaration.constraint[1], None, owner)
-    if isinstance(declaration, Component) or declaration.base is not None:
-        return modifier(declaration.arguments, None, owner)
-    return None
-
-
-def check_replaceable(element: Element, scope: Scope, replacement: Component | ClassDefinition) -> None:
-    """Raises ModelicaError where what is redeclared is not replaceable, or the class does not fit the constraint."""
-    declaration, owner, _ = element
-    place = scope.place(replacement.line)
-    if not declaration.prefixes & {"replaceable", "redeclare"}:
-        raise ModelicaError(f"{place}: {declaration.name} is redeclared, but is not declared replaceable.")
-    if not (isinstance(declaration, Component) and isinstance(replacement, Component)):
-        return
-    wanted = owner.find_class(declaration.constraint[0] if declaration.constraint else declaration.type)
-    given = scope.find_class(replacement.type)
-    if wanted is None or given is None or wanted.definition is given.definition:
-        return
-    missing = [
-        name
-        for name, (part, *_) in wanted.elements.items()
-        if isinstance(part, Component) and not part.protected and name not in given.elements
-    ]
-    if missing:
-        raise ModelicaError(
-            f"{place}: {given.qualified} cannot replace {declaration.name}: it has no {missing[0]}, unlike "
-            f"{wanted.qualified}."
-        )
-
-
-def resolved(element: Element) -> tuple[Component, Scope, Modifier | None]:
-    """Declaration, scope and modification of a component after redeclaration."""
-    declaration, owner, given = element
-    assert isinstance(declaration, Component)
-    if given is None or given.redeclare is None:
-        return declaration, owner, merge(given, modifier(declaration.arguments, declaration.value, owner))
-    replacement, scope = given.redeclare
-    if not isinstance(replacement, Component):
-        raise ModelicaError(
-            f"{scope.place(replacement.line)}: {declaration.name} is a component, not a class."
-        )
-    check_replaceable(element, scope, replacement)
-    outer = Modifier(given.binding, given.children, None, given.each, given.final)
-    own = modifier(replacement.arguments, replacement.value, scope)
-    merged = merge(merge(outer, own), _constraint(declaration, owner))
-    if merged is not None and merged.binding is None and declaration.value is not None:
-        merged = merge(merged, Modifier(Binding(declaration.value, owner)))
-    elif merged is None and declaration.value is not None:
-        merged = Modifier(Binding(declaration.value, owner))
-    combined = Component(
-        declaration.name,
-        replacement.type,
-        (declaration.prefixes & _TYPE_PREFIXES) | replacement.prefixes,
-        replacement.dimensions or declaration.dimensions,
-        [],
-        None,
-        declaration.condition,
-        replacement.description or declaration.description,
-        None,
-        declaration.protected,
-        replacement.line,
-    )
-    return combined, scope, merged

@@ -52,6 +52,7 @@ class Statements:
         self.evaluator = evaluator
         self.asserted = asserted
         self.guard: Scalar = True
+        self.partly: set[str] = set()  # names that some branch gave no value
 
     def _at(self, env: Env) -> Evaluator:
         made = Evaluator(self.evaluator.scope, env, self.evaluator.in_function)
@@ -133,6 +134,8 @@ class Statements:
                 steps.append(part)
             if indices:
                 steps.append(tuple(indices))
+        if self.guard is True and not steps:
+            self.partly.discard(name)
         env[name] = self._placed(env[name], steps, value, target, env)
 
     def _placed(self, old: Value, steps: list[Any], value: Value, target: Syntax, env: Env) -> Value:
@@ -279,6 +282,8 @@ class Statements:
         merged = {}
         for name in no:
             a, b = yes.get(name, UNSET), no[name]
+            if (a is UNSET) != (b is UNSET):
+                self.partly.add(name)
             merged[name] = a if a is b else self._select(condition, a, b, line)
         return merged
 

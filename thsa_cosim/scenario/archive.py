@@ -27,7 +27,7 @@ def write_system(scenario: Path, output: Path | None) -> Path:
         raise ScenarioError(f"{scenario}: it runs {table.fmu} and describes no system; add [[components]].")
     target = output or scenario.with_suffix(".ssp")
     try:
-        archive = assemble_tables(scenario, table)
+        archive = assemble_tables(scenario, table).path
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(archive, target)
     except FmuError as error:

@@ -24,6 +24,7 @@ from thsa_cosim.scenario.schema import (
 )
 from thsa_cosim.scenario.table import Name
 from thsa_cosim.signals import Signals
+from thsa_cosim.system.description import SystemDescription
 
 
 class ForceSpec(ForceTable):
@@ -124,8 +125,9 @@ class Scenario:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the recordings' reader has to say about them."""
-        return tuple(note for recording in (*self.fit, *self.validate) for note in recording.notes)
+        """What the readers of the system and of the recordings have to say."""
+        read = self.fmu.system.notes if isinstance(self.fmu, SystemDescription) else ()
+        return (*read, *(note for recording in (*self.fit, *self.validate) for note in recording.notes))
 
     def drive(self, recording: Recording) -> Signals:
         """Return the FMU's inputs of a recording."""

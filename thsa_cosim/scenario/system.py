@@ -21,14 +21,14 @@ def open_model(
     if isinstance(replaced_by, FmuDescription):
         return replaced_by
     if replaced_by is not None:
-        return _compiled(Path(replaced_by), table)
+        return _compiled(read_description(replaced_by), table)
     if table.fmu:
-        return _compiled(path.parent / table.fmu, table)
+        return _compiled(read_description(path.parent / table.fmu), table)
     return _compiled(assemble_tables(path, table), table)
 
 
-def assemble_tables(path: Path, table: ModelTable) -> Path:
-    """Return the archive of the system that the tables of the scenario ``path`` describe."""
+def assemble_tables(path: Path, table: ModelTable) -> SystemDescription:
+    """Return the system that the tables of the scenario ``path`` describe, kept as an archive."""
     parts = [
         Part(
             c.name,
@@ -38,6 +38,7 @@ def assemble_tables(path: Path, table: ModelTable) -> Path:
             c.delay,
             {k: float(v) for k, v in c.start.items()},
             c.jitter,
+            c.process,
         )
         for c in table.components
     ]
@@ -53,14 +54,13 @@ def assemble_tables(path: Path, table: ModelTable) -> Path:
     return assembled(path.stem, parts, wires, pins)
 
 
-def _compiled(path: Path, table: ModelTable) -> FmuDescription:
-    """Describe an FMU or a system; a system that can be merged into one FMU as that FMU."""
-    description = read_description(path)
+def _compiled(description: FmuDescription, table: ModelTable) -> FmuDescription:
+    """An FMU or a system as it is run: a system that can be merged into one FMU as that FMU."""
     if not isinstance(description, SystemDescription) or not table.merge:
         return description
     from thsa_cosim.export.merge import NotMergeable, merge
 
-    with zipfile.ZipFile(path) as archive:
+    with zipfile.ZipFile(description.path) as archive:
         parts = {c.source: archive.read(c.source) for c in description.system.components}
     try:
         return read_description(merge(description, parts, system_folder() / "merged"))

@@ -5,11 +5,13 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from thsa_cosim.errors import FmuError, did_you_mean
 from thsa_cosim.fmu.archive import sha256_of
 from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription
 from thsa_cosim.fmu.description import read_description as read_fmu
+from thsa_cosim.system.description import SystemDescription, describe_system
 from thsa_cosim.system.structure import (
     Component,
     Connection,
@@ -36,6 +38,7 @@ class Part:
     delay: float = 0.0
     start: Mapping[str, float] = field(default_factory=dict)
     jitter: float = 0.0
+    process: Literal["shared", "own"] = "shared"
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,17 @@ def assemble(
         if step is None and execution == "coupled":
             step = fmu.default_experiment.step or _STEP
         components.append(
-            Component(part.name, fmu, source, execution, dict(part.start), step, part.delay, part.jitter)
+            Component(
+                part.name,
+                fmu,
+                source,
+                execution,
+                dict(part.start),
+                step,
+                part.delay,
+                part.jitter,
+                part.process,
+            )
         )
 
     by_name = {component.name: component.fmu for component in components}
@@ -108,8 +121,8 @@ def system_folder() -> Path:
 
 def assembled(
     name: str, parts: Sequence[Part], wires: Sequence[Wire], connectors: Mapping[str, Sequence[str]]
-) -> Path:
-    """Write the system as an archive into the user's cache folder, named after its content, and return its path."""
+) -> SystemDescription:
+    """Write the system as an archive into the user's cache folder, named after its content, and describe it."""
     system, archives = assemble(name, parts, wires, connectors)
     folder = system_folder()
     stops = [c.fmu.default_experiment.stop for c in system.components if c.fmu.default_experiment.stop]
@@ -117,12 +130,12 @@ def assembled(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         draft = write_ssp(system, archives, folder / f"{os.getpid()}.ssp", experiment)
-        digest = hashlib.sha256(draft.read_bytes()).hexdigest()[:24]
-        final = folder / digest / f"{name}.ssp"
+        digest = hashlib.sha256(draft.read_bytes()).hexdigest()
+        final = folder / digest[:24] / f"{name}.ssp"
         final.parent.mkdir(exist_ok=True)
         draft.replace(final)
     except OSError as error:
         raise FmuError(
             f"the system cannot be kept in {folder} ({error.strerror or error}); set XDG_CACHE_HOME to another folder."
         ) from None
-    return final
+    return describe_system(system, final, digest, experiment)

@@ -18,8 +18,8 @@ class SystemDescription(FmuDescription):
 
     system: System = field(default_factory=lambda: System("", (), ()))
     pins: Mapping[str, tuple[tuple[tuple[str, str], float, float], ...]] = field(default_factory=dict)
-    """What a name stands for: ((component, variable), factor, offset), for inputs from the name to the pin, for all
-    others from the pin to the name."""
+    """What a name stands for: ((component, variable), factor, offset), for inputs and parameters from the name to the
+    pin, for all others from the pin to the name."""
 
 
 def describe_system(
@@ -39,10 +39,10 @@ def describe_system(
     for connector in system.connectors:
         pin, factor, offset = connector.pins[0]
         variable = system.variable(pin)
-        start = variable.start
+        start = system.component(pin[0]).start.get(pin[1], variable.start)
         if start is not None:
-            moved = (start - offset) / factor if connector.causality == "input" else factor * start + offset
-            start = moved
+            is_output = connector.causality == "output"
+            start = factor * start + offset if is_output else (start - offset) / factor if factor else None
         shown = replace(
             variable,
             causality=connector.causality,

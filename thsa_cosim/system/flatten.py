@@ -1,11 +1,12 @@
 """Nested systems of an SSP → one flat :class:`System`: connections followed through connectors, parameters placed."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from thsa_cosim.errors import FmuError, UnitError, did_you_mean
 from thsa_cosim.fmu.description import FmuDescription
+from thsa_cosim.system.parameters import Binding, Placement
 from thsa_cosim.system.structure import (
     Component,
     Connection,
@@ -15,38 +16,18 @@ from thsa_cosim.system.structure import (
     checked,
     default_execution,
 )
-from thsa_cosim.units import conversion
+from thsa_cosim.system.unit_definitions import UnitDefinitions
 
-
-@dataclass(frozen=True)
-class Binding:
-    """Parameter values for an element and what it contains (SSP 1.0, 5.3.2)."""
-
-    prefix: str
-    values: Mapping[str, float]
-    units: Mapping[str, str]
-    mapping: Mapping[str, tuple[str, float, float]] | None = None
-    """Target → (source, factor, offset); None: names are targets."""
-
-    def entries(self) -> Iterator[tuple[str, float, str]]:
-        """Yield (target, value, unit)."""
-        if self.mapping is None:
-            for name, value in self.values.items():
-                yield self.prefix + name, value, self.units.get(name, "")
-            return
-        for target, (source, factor, offset) in self.mapping.items():
-            if source not in self.values:
-                raise FmuError(
-                    f"a parameter mapping names {source!r}, which its values lack.{did_you_mean(source, self.values)}"
-                )
-            is_plain = factor == 1.0 and offset == 0.0
-            value = factor * self.values[source] + offset
-            yield self.prefix + target, value, self.units.get(source, "") if is_plain else ""
+_SENDS_OUTWARDS = ("output", "calculatedParameter", "constant", "local")
+_TAKES = ("input", "parameter", "structuralParameter")
 
 
 @dataclass(frozen=True)
 class Link:
-    """A connection as it stands in the file; an empty element is the system itself."""
+    """A connection as it stands in the file; an empty element is the system itself.
+
+    Start and end say nothing of the direction (SSP 1.0, section 5.3.3.1): the kinds of the connectors do.
+    """
 
     start_element: str
     start: str
@@ -54,6 +35,7 @@ class Link:
     end: str
     factor: float = 1.0
     offset: float = 0.0
+    """target = factor * source + offset, after units are converted."""
     suppress_units: bool = False
     disturbance: str = ""
 
@@ -61,6 +43,16 @@ class Link:
         start = f"{self.start_element}.{self.start}" if self.start_element else self.start
         end = f"{self.end_element}.{self.end}" if self.end_element else self.end
         return f"{start} -> {end}"
+
+    def turned(self) -> "Link":
+        """The same connection with its ends exchanged."""
+        return replace(
+            self,
+            start_element=self.end_element,
+            start=self.end,
+            end_element=self.start_element,
+            end=self.start,
+        )
 
 
 @dataclass(frozen=True)
@@ -75,6 +67,15 @@ class Element:
     step: float | None = None
     delay: float = 0.0
     jitter: float = 0.0
+    process: Literal["shared", "own"] = "shared"
+
+
+@dataclass(frozen=True)
+class Bus:
+    """A reference to a signal dictionary: all references to one dictionary are the same set of signals."""
+
+    name: str
+    dictionary: str
 
 
 @dataclass(frozen=True)
@@ -82,81 +83,228 @@ class Nested:
     """A system as it stands in the file."""
 
     name: str
-    elements: "tuple[Element | Nested, ...]"
+    elements: "tuple[Element | Nested | Bus, ...]"
     links: tuple[Link, ...]
     connectors: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """Kind ("input", "output", "parameter", …) and unit by name."""
     bindings: tuple[Binding, ...] = ()
+    dictionaries: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """Signal dictionaries that it defines: units of their signals."""
 
 
 @dataclass(frozen=True)
 class _Node:
-    """A connector: of a component, or of a nested system, or of the whole (path empty)."""
+    """A connector: of a component, of a nested system, of the whole (path empty), or a signal of a dictionary."""
 
     path: str
     name: str
+    is_signal: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.path}.{self.name}".strip(".")
 
 
 @dataclass(frozen=True)
 class _Way:
-    """From one connector to another: end = factor * start + offset, then units where ``convert`` says so."""
+    """From one connector to another: end = factor * start + offset, units included."""
 
     start: _Node
     end: _Node
     factor: float
     offset: float
-    convert: bool
     disturbance: str = ""
 
 
-def flattened(nested: Nested) -> System:
+def flattened(nested: Nested, definitions: UnitDefinitions | None = None) -> System:
     """Flatten and check; FmuError in one sentence where something does not fit."""
-    components = list(_components(nested, ""))
-    starts = _starts(nested, {c.name: c.fmu for c in components})
-    components = [replace(c, start=starts.get(c.name, {})) for c in components]
-    links = list(_links(nested, ""))
-    names = {c.name for c in components}
-    into: dict[_Node, list[_Way]] = {}
-    for way in links:
-        into.setdefault(way.end, []).append(way)
-    for end, writers in into.items():
-        if len(writers) > 1:
-            shown = " and ".join(f"{w.start.path}.{w.start.name}".strip(".") for w in writers)
-            raise FmuError(f"{end.path}.{end.name}".strip(".") + f" has two writers, {shown}; keep one.")
-    connections = []
-    inputs: dict[str, list[_Way]] = {}
-    for end in into:
-        if end.path not in names:
-            continue
-        way = _origin(end, into, names)
-        if way.start.path in names:
-            source, target = (way.start.path, way.start.name), (end.path, end.name)
-            connections.append(
-                Connection(source, target, way.factor, way.offset, way.convert, way.disturbance)
+    return _Flat(nested, definitions or UnitDefinitions()).system()
+
+
+class _Flat:
+    """One flattening."""
+
+    def __init__(self, nested: Nested, definitions: UnitDefinitions) -> None:
+        self._nested, self._definitions = nested, definitions
+        self._components = {c.name: c for c in _components(nested, "")}
+        self._connectors = [_Node(path, name) for path, name, _ in _connectors(nested, "")]
+        self._into: dict[_Node, _Way] = {}
+        self._units = {_Node(path, name): unit for path, name, unit in _connectors(nested, "")}
+
+    def system(self) -> System:
+        directed = list(self._directed(self._nested, "", {}))
+        self._infer_units(directed)
+        for start, end, link in directed:
+            if end in self._into:
+                raise FmuError(f"{end} has two writers, {self._into[end].start} and {start}; keep one.")
+            factor, offset = (1.0, 0.0) if link.suppress_units else self._conversion(start, end, link)
+            factor, offset = link.factor * factor, link.factor * offset + link.offset
+            self._into[end] = _Way(start, end, factor, offset, link.disturbance)
+        units = {(node.path, node.name): self._unit(node) for node in self._connectors}
+        fmus = {name: component.fmu for name, component in self._components.items()}
+        placement = Placement(fmus, units, self._definitions)
+        _place(self._nested, "", placement)
+        connections = []
+        takers: dict[_Node, list[_Way]] = {}
+        for end in self._into:
+            if end.path not in self._components:
+                continue
+            chain = self._chain(end)
+            origin = chain[-1]
+            if origin.start.path in self._components:
+                source, target = (origin.start.path, origin.start.name), (end.path, end.name)
+                disturbance = self._into[end].disturbance
+                connections.append(
+                    Connection(source, target, origin.factor, origin.offset, False, disturbance)
+                )
+                continue
+            if origin.start.is_signal:
+                continue  # a signal of a dictionary that nobody writes: the input stays open
+            takers.setdefault(origin.start, []).append(origin)
+            for way in reversed(chain):  # what is set furthest outside wins
+                value = placement.connectors.get((way.start.path, way.start.name))
+                if value is not None:
+                    found = placement.starts.setdefault(end.path, {})
+                    found[end.name] = way.factor * value + way.offset
+                    break
+        connectors = [self._taking(node, ways) for node, ways in takers.items()]
+        connectors += self._shown()
+        parts = [replace(c, start=placement.starts.get(c.name, {})) for c in self._components.values()]
+        made = System(self._nested.name, tuple(parts), tuple(connections), tuple(connectors))
+        return replace(checked(made), notes=tuple(placement.notes))
+
+    def _taking(self, node: _Node, ways: Sequence[_Way]) -> Connector:
+        """A connector that drives components; one of a nested system that nothing is connected to keeps its path."""
+        pins = tuple(((way.end.path, way.end.name), way.factor, way.offset) for way in ways)
+        takers = {self._components[c].fmu.variable(v).causality for (c, v), *_ in pins}
+        causality: Literal["input", "parameter"] = "input" if takers == {"input"} else "parameter"
+        return Connector(str(node), causality, pins, self._unit(node), convert=False)
+
+    def _shown(self) -> Iterator[Connector]:
+        """The outputs of the whole."""
+        for name, (kind, _) in self._nested.connectors.items():
+            node = _Node("", name)
+            if kind not in _TAKES and node in self._into:
+                way = self._chain(node)[-1]
+                if way.start.path in self._components:
+                    pin = (way.start.path, way.start.name), way.factor, way.offset
+                    yield Connector(name, "output", (pin,), self._unit(node), convert=False)
+
+    def _chain(self, end: _Node) -> list[_Way]:
+        """Ways to ``end`` from ever further back, each as a whole, through connectors and signals."""
+        found: list[_Way] = []
+        node, factor, offset = end, 1.0, 0.0
+        seen = {end}
+        while node in self._into:
+            way = self._into[node]
+            node = way.start
+            factor, offset = factor * way.factor, factor * way.offset + offset
+            found.append(_Way(node, end, factor, offset))
+            if node.path in self._components:
+                break
+            if node in seen:
+                raise FmuError(f"the connectors {node} and others feed each other in a circle; cut it.")
+            seen.add(node)
+        return found
+
+    # -- connections ------------------------------------------------------------------------------------
+    def _directed(
+        self, system: Nested, path: str, above: Mapping[str, str]
+    ) -> Iterator[tuple[_Node, _Node, Link]]:
+        """Every connection from what sends to what takes; ``above``: owner of each signal dictionary."""
+        owners = {**above, **dict.fromkeys(system.dictionaries, path)}
+        for owner_name, signals in system.dictionaries.items():
+            for signal, unit in signals.items():
+                self._units[_Node(f"{path}\0{owner_name}", signal, is_signal=True)] = unit
+        inside = {e.name: e for e in system.elements}
+        for given in system.links:
+            ends = [
+                self._end(system, path, inside, owners, given, *end)
+                for end in ((given.start_element, given.start), (given.end_element, given.end))
+            ]
+            (start, sends), (end, takes_not) = ends
+            if sends is not None and sends == takes_not:
+                what = "two that send" if sends else "two that take"
+                raise FmuError(f"connection {given} joins {what}; one end has to send and the other to take.")
+            if sends is False or (sends is None and takes_not):
+                start, end = end, start
+            yield start, end, given
+        for element in system.elements:
+            if isinstance(element, Nested):
+                yield from self._directed(element, f"{path}.{element.name}".lstrip("."), owners)
+
+    def _end(
+        self,
+        system: Nested,
+        path: str,
+        inside: "Mapping[str, Element | Nested | Bus]",
+        owners: Mapping[str, str],
+        link: Link,
+        name: str,
+        connector: str,
+    ) -> tuple[_Node, bool | None]:
+        """One end of a connection, and whether it sends; None where its kind leaves that open."""
+        if name and name not in inside:
+            raise FmuError(f"connection {link}: there is no element {name!r}.{did_you_mean(name, inside)}")
+        found = inside.get(name)
+        where = f"{path}.{name}".strip(".")
+        if isinstance(found, Element):
+            return _Node(where, connector), found.fmu.variable(connector).causality not in _TAKES
+        if isinstance(found, Bus):
+            if found.dictionary not in owners:
+                raise FmuError(
+                    f"{name!r} refers to the signal dictionary {found.dictionary!r}, which there is not."
+                    f"{did_you_mean(found.dictionary, owners)}"
+                )
+            node = _Node(f"{owners[found.dictionary]}\0{found.dictionary}", connector, is_signal=True)
+            if node not in self._units:
+                signals = [n.name for n in self._units if n.path == node.path]
+                raise FmuError(
+                    f"connection {link}: the signal dictionary {found.dictionary!r} has no {connector!r}."
+                    f"{did_you_mean(connector, signals)}"
+                )
+            return node, None
+        known = system.connectors if found is None else found.connectors
+        if connector not in known:
+            raise FmuError(
+                f"connection {link}: there is no connector {connector!r}.{did_you_mean(connector, known)}"
             )
-        elif way.start.path == "":
-            inputs.setdefault(way.start.name, []).append(way)
-        else:
-            where = f"{way.start.path}.{way.start.name}"
-            raise FmuError(f"nothing is connected to {where}, which {end.path}.{end.name} takes; connect it.")
-    connectors = [_connector(nested, name, "input", ways) for name, ways in inputs.items()]
-    for name, (kind, _) in nested.connectors.items():
-        if kind == "output" and _Node("", name) in into:
-            way = _origin(_Node("", name), into, names)
-            if way.start.path in names:
-                connectors.append(_connector(nested, name, "output", [way]))
-    return checked(System(nested.name, tuple(components), tuple(connections), tuple(connectors)))
+        kind = known[connector][0]
+        outwards = True if kind in _SENDS_OUTWARDS else False if kind in _TAKES else None
+        if outwards is not None and found is None:
+            outwards = not outwards  # seen from inside
+        return _Node(where, connector), outwards
 
+    def _unit(self, node: _Node) -> str:
+        if node.path in self._components:
+            return self._components[node.path].fmu.variable(node.name).unit or ""
+        return self._units.get(node, "")
 
-def _connector(
-    nested: Nested, name: str, causality: Literal["input", "output"], ways: "list[_Way]"
-) -> Connector:
-    pins = []
-    for way in ways:
-        node = way.end if causality == "input" else way.start
-        pins.append(((node.path, node.name), way.factor, way.offset))
-    unit = nested.connectors.get(name, ("", ""))[1]
-    return Connector(name, causality, tuple(pins), unit, convert=all(way.convert for way in ways))
+    def _infer_units(self, directed: Sequence[tuple[_Node, _Node, Link]]) -> None:
+        """A connector without a unit takes that of what it is plainly connected to."""
+        plain = [
+            (start, end)
+            for start, end, link in directed
+            if not link.suppress_units and link.factor == 1.0 and link.offset == 0.0
+        ]
+        for _ in plain:
+            before = dict(self._units)
+            for pair in plain:
+                for known, open_end in (pair, pair[::-1]):
+                    if open_end in self._units and not self._units[open_end]:
+                        self._units[open_end] = self._unit(known)
+            if before == self._units:
+                return
+
+    def _conversion(self, start: _Node, end: _Node, link: Link) -> tuple[float, float]:
+        a, b = self._unit(start), self._unit(end)
+        if not a or not b or a == b:
+            return 1.0, 0.0
+        try:
+            return self._definitions.conversion(a, b)
+        except UnitError as error:
+            raise FmuError(
+                f"connection {link}: {error} Or set suppressUnitConversion and a LinearTransformation."
+            ) from None
 
 
 def _components(nested: Nested, path: str) -> Iterator[Component]:
@@ -164,17 +312,40 @@ def _components(nested: Nested, path: str) -> Iterator[Component]:
         name = f"{path}{element.name}"
         if isinstance(element, Nested):
             yield from _components(element, f"{name}.")
-            continue
-        yield Component(
-            name,
-            element.fmu,
-            element.source,
-            _execution(element),
-            {},
-            _step(element),
-            element.delay,
-            element.jitter,
-        )
+        elif isinstance(element, Element):
+            yield Component(
+                name,
+                element.fmu,
+                element.source,
+                _execution(element),
+                {},
+                _step(element),
+                element.delay,
+                element.jitter,
+                element.process,
+            )
+
+
+def _connectors(nested: Nested, path: str) -> Iterator[tuple[str, str, str]]:
+    """Yield path, name and unit of every connector of every system."""
+    for name, (_, unit) in nested.connectors.items():
+        yield path, name, unit
+    for element in nested.elements:
+        if isinstance(element, Nested):
+            yield from _connectors(element, f"{path}.{element.name}".lstrip("."))
+
+
+def _place(nested: Nested, path: str, placement: Placement) -> None:
+    """Place all bindings, those of an outer system after those of its elements, so that they win (SSP 1.0, 5.3.2)."""
+    for element in nested.elements:
+        where = f"{path}.{element.name}".lstrip(".")
+        if isinstance(element, Nested):
+            _place(element, where, placement)
+        elif isinstance(element, Element):
+            for binding in element.bindings:
+                placement.place(binding, where)
+    for binding in nested.bindings:
+        placement.place(binding, path)
 
 
 def _execution(element: Element) -> Execution:
@@ -192,87 +363,3 @@ def _step(element: Element) -> float | None:
     if element.step is not None or _execution(element) == "continuous":
         return element.step
     return element.fmu.default_experiment.step or 1e-3
-
-
-def _links(nested: Nested, path: str) -> Iterator[_Way]:
-    inside = {e.name: e for e in nested.elements}
-    for link in nested.links:
-        ends = []
-        for name, connector in ((link.start_element, link.start), (link.end_element, link.end)):
-            if name and name not in inside:
-                raise FmuError(
-                    f"connection {link}: there is no element {name!r}.{did_you_mean(name, inside)}"
-                )
-            found = inside.get(name)
-            if isinstance(found, Element):
-                found.fmu.variable(connector)
-            known = nested.connectors if not name else found.connectors if isinstance(found, Nested) else None
-            if known is not None and connector not in known:
-                raise FmuError(
-                    f"connection {link}: there is no connector {connector!r}.{did_you_mean(connector, known)}"
-                )
-            ends.append(_Node(f"{path}{name}" if name else path.rstrip("."), connector))
-        yield _Way(ends[0], ends[1], link.factor, link.offset, not link.suppress_units, link.disturbance)
-    for element in nested.elements:
-        if isinstance(element, Nested):
-            yield from _links(element, f"{path}{element.name}.")
-
-
-def _origin(end: _Node, into: Mapping[_Node, list[_Way]], names: set[str]) -> _Way:
-    """Follow connectors of nested systems back to a component's output or a connector of the whole."""
-    node, factor, offset, convert = end, 1.0, 0.0, True
-    disturbance = into[end][0].disturbance if end in into else ""
-    seen = {end}
-    while node in into:
-        way = into[node][0]
-        node, convert = way.start, convert and way.convert
-        factor, offset = factor * way.factor, factor * way.offset + offset
-        if node.path in names:
-            break
-        if node in seen:
-            raise FmuError(
-                f"the connectors {node.path}.{node.name} and others feed each other in a circle; cut it."
-            )
-        seen.add(node)
-    return _Way(node, end, factor, offset, convert, disturbance)
-
-
-def _starts(
-    nested: Nested, fmus: Mapping[str, FmuDescription], path: str = ""
-) -> dict[str, dict[str, float]]:
-    """Start values by component: those of an outer system win over those of an inner element (SSP 1.0, 5.3.2)."""
-    found: dict[str, dict[str, float]] = {}
-    for element in nested.elements:
-        name = f"{path}{element.name}"
-        if isinstance(element, Nested):
-            for component, values in _starts(element, fmus, f"{name}.").items():
-                found.setdefault(component, {}).update(values)
-            continue
-        for binding in element.bindings:
-            for target, value, unit in binding.entries():
-                found.setdefault(name, {})[target] = _in_unit(fmus[name], target, value, unit)
-    for binding in nested.bindings:
-        for target, value, unit in binding.entries():
-            component, variable = _owner(path + target, fmus)
-            found.setdefault(component, {})[variable] = _in_unit(fmus[component], variable, value, unit)
-    return found
-
-
-def _owner(name: str, fmus: Mapping[str, FmuDescription]) -> tuple[str, str]:
-    for component in fmus:
-        if name.startswith(component + "."):
-            return component, name[len(component) + 1 :]
-    raise FmuError(
-        f"a parameter binding sets {name!r}, but there is no such component.{did_you_mean(name.split('.')[0], fmus)}"
-    )
-
-
-def _in_unit(fmu: FmuDescription, name: str, value: float, unit: str) -> float:
-    wanted = fmu.variable(name).unit
-    if not unit or not wanted or unit == wanted:
-        return value
-    try:
-        factor, offset = conversion(unit, wanted)
-    except UnitError as error:
-        raise FmuError(f"parameter {name}: {error}") from None
-    return factor * value + offset

@@ -1,10 +1,10 @@
 """SSP archives: read into a :class:`System`, and written.
 
 Source: Modelica Association, *System Structure and Parameterization* 1.0 (2019) and 2.0 (2024). Read: nested systems,
-connectors of all numeric types, connections with linear transformations, parameter bindings (inline or a resource, with
-parameter mapping), FMUs as resources or from another place relative to the archive. How a component goes on (its step,
-delay, and whether it is sampled) is no part of SSP: it stands in an annotation of the type ``thsa-cosim``, which other
-tools skip.
+connectors of all numeric types, signal dictionaries, connections with linear transformations, units by their
+definitions, parameter bindings (inline or a resource, with parameter mapping), FMUs as resources or from another place
+relative to the archive. How a component goes on (its step, delay, and whether it is sampled) is no part of SSP: it
+stands in an annotation of the type ``thsa-cosim``, which other tools skip.
 """
 
 import posixpath
@@ -13,17 +13,20 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from urllib.parse import unquote
 
 from thsa_cosim.errors import FmuError, InputError, ParameterError
 from thsa_cosim.fmu.archive import check_archive, open_archive
 from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription, read_description
-from thsa_cosim.ssv import FLOATS, SSV, parse_ssv
-from thsa_cosim.system.flatten import Binding, Element, Link, Nested, flattened
+from thsa_cosim.ssv import FLOATS, SSC, SSV, parse_parameter_set
+from thsa_cosim.system.flatten import Bus, Element, Link, Nested, flattened
+from thsa_cosim.system.parameters import Binding, Mapped
 from thsa_cosim.system.structure import System
+from thsa_cosim.system.unit_definitions import UnitDefinitions, read_units
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
-SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSM = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
+SSB = "http://ssp-standard.org/SSP1/SystemStructureSignalDictionary"
 ROOT = "SystemStructure.ssd"
 ANNOTATION = "thsa-cosim"
 _LARGEST = 64 * 2**20
@@ -57,11 +60,21 @@ def read_ssp(path: Path, fmus: Mapping[str, FmuDescription]) -> Archive:
         check_archive(path, archive)
         try:
             root = _xml(path, archive, ROOT)
+            units = UnitDefinitions(_units(path, archive))
             nested = _system(path, archive, _required(path, root, "System"), fmus, frozenset())
-            return Archive(flattened(nested), _experiment(root))
+            return Archive(flattened(nested, units), _experiment(root))
         except InputError as error:
             message = str(error)
             raise FmuError(message if str(path) in message else f"{path}: {message}") from None
+
+
+def _units(path: Path, archive: zipfile.ZipFile) -> dict[str, tuple[Mapping[str, int], float, float]]:
+    """Definitions of units in all of the archive's files; a name means the same in each."""
+    found = {}
+    for name in archive.namelist():
+        if name.endswith((".ssd", ".ssv", ".ssb")):
+            found.update(read_units(_xml(path, archive, name)))
+    return found
 
 
 def sources(path: Path) -> list[str]:
@@ -99,7 +112,13 @@ def _source(path: Path, component: ET.Element, member: str) -> str:
         raise FmuError(
             f"{path}: component {name!r} has the source {source!r}; put its FMU into the archive's resources."
         )
-    return posixpath.normpath(posixpath.join(posixpath.dirname(member), source))
+    return _inside(member, source)
+
+
+def _inside(member: str, reference: str) -> str:
+    """Path within the archive of what ``member`` refers to by a URI (RFC 3986)."""
+    plain = unquote(reference.removeprefix("file:")).replace("\\", "/").lstrip("/")
+    return posixpath.normpath(posixpath.join(posixpath.dirname(member), plain))
 
 
 def _xml(path: Path, archive: zipfile.ZipFile, member: str) -> ET.Element:
@@ -156,7 +175,7 @@ def _system(
     above: frozenset[str],
     member: str = ROOT,
 ) -> Nested:
-    elements: list[Element | Nested] = []
+    elements: list[Element | Nested | Bus] = []
     for child in element.iterfind(f"{{{SSD}}}Elements/*"):
         tag = child.tag.removeprefix(f"{{{SSD}}}")
         if tag == "System":
@@ -164,16 +183,35 @@ def _system(
         elif tag == "Component":
             elements.append(_component(path, archive, child, fmus, above | {member}, member))
         elif tag == "SignalDictionaryReference":
-            raise FmuError(
-                f"{path}: {child.get('name', '')!r} is a signal dictionary, which is not supported; connect directly."
-            )
+            elements.append(Bus(child.get("name", ""), child.get("dictionary", "")))
     return Nested(
         name=element.get("name", ""),
         elements=tuple(elements),
         links=tuple(_link(c) for c in element.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection")),
         connectors=_connectors(element),
         bindings=_bindings(path, archive, element, member),
+        dictionaries=_dictionaries(path, archive, element, member),
     )
+
+
+def _dictionaries(
+    path: Path, archive: zipfile.ZipFile, element: ET.Element, member: str
+) -> dict[str, dict[str, str]]:
+    """Units of the signals by dictionary."""
+    found = {}
+    for dictionary in element.iterfind(f"{{{SSD}}}SignalDictionaries/{{{SSD}}}SignalDictionary"):
+        source = dictionary.get("source")
+        root = _xml(path, archive, _inside(member, source)) if source else dictionary
+        name = dictionary.get("name", "")
+        found[name] = {
+            entry.get("name", ""): _unit(entry) for entry in root.iter(f"{{{SSB}}}DictionaryEntry")
+        }
+    return found
+
+
+def _unit(element: ET.Element) -> str:
+    typed = next((e for k in FLOATS for e in element.iterfind(f"{{{SSC}}}{k}")), None)
+    return "" if typed is None else typed.get("unit", "")
 
 
 def _component(
@@ -202,6 +240,7 @@ def _component(
         step=_float(given.get("step")),
         delay=_float(given.get("delay")) or 0.0,
         jitter=_float(given.get("jitter")) or 0.0,
+        process="own" if given.get("process") == "own" else "shared",
     )
 
 
@@ -238,9 +277,7 @@ def _connectors(element: ET.Element) -> Mapping[str, tuple[str, str]]:
             raise FmuError(
                 f"connector {name!r} is a clock (SSP 2.0), which is not supported; give a step instead."
             )
-        typed = next((e for k in FLOATS for e in connector.iterfind(f"{{{SSC}}}{k}")), None)
-        unit = "" if typed is None else typed.get("unit", "")
-        found[name] = (connector.get("kind", ""), unit)
+        found[name] = (connector.get("kind", ""), _unit(connector))
     return found
 
 
@@ -278,7 +315,7 @@ def _bindings(path: Path, archive: zipfile.ZipFile, element: ET.Element, member:
     for binding in element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding"):
         source = binding.get("source")
         if source:
-            inside = posixpath.normpath(posixpath.join(posixpath.dirname(member), source))
+            inside = _inside(member, source)
             root = _xml(path, archive, inside)
         else:
             inside = f"the parameters of {element.get('name')!r}"
@@ -289,29 +326,42 @@ def _bindings(path: Path, archive: zipfile.ZipFile, element: ET.Element, member:
                 )
             root = inline
         try:
-            parameters = parse_ssv(root, f"{path}: {inside}")
+            parameters = parse_parameter_set(root, f"{path}: {inside}")
         except ParameterError as error:
             raise FmuError(str(error)) from None
         mapping = _mapping(path, archive, binding, member)
-        found.append(Binding(binding.get("prefix", ""), parameters.values, parameters.units, mapping))
+        found.append(
+            Binding(
+                binding.get("prefix", ""),
+                parameters.values,
+                parameters.units,
+                mapping,
+                inside,
+                parameters.others,
+            )
+        )
     return tuple(found)
 
 
 def _mapping(
     path: Path, archive: zipfile.ZipFile, binding: ET.Element, member: str
-) -> Mapping[str, tuple[str, float, float]] | None:
-    """Target → (source, factor, offset) of a binding's parameter mapping; None if it has none."""
+) -> Mapping[str, Mapped] | None:
+    """Parameter mapping of a binding by target; None if it has none."""
     element = binding.find(f"{{{SSD}}}ParameterMapping")
     if element is None:
         return None
     source = element.get("source")
-    inside = source and posixpath.normpath(posixpath.join(posixpath.dirname(member), source))
+    inside = source and _inside(member, source)
     root = _xml(path, archive, inside) if inside else element.find(f"{{{SSM}}}ParameterMapping")
     if root is None:
         raise FmuError(f"{path}: a parameter mapping has neither source nor entries.")
     entries = {}
     for entry in root.iterfind(f"{{{SSM}}}MappingEntry"):
-        entries[entry.get("target", "")] = (entry.get("source", ""), *_linear(entry, entry.get("target", "")))
+        target = entry.get("target", "")
+        if target in entries:
+            raise FmuError(f"{path}: a parameter mapping sets {target!r} twice; keep one.")
+        suppress = entry.get("suppressUnitConversion") in ("true", "1")
+        entries[target] = Mapped(entry.get("source", ""), *_linear(entry, target), suppress)
     return entries
 
 

@@ -35,6 +35,8 @@ class Component:
     """Time from a tick until a sampled component's outputs change [s], at most one ``step``."""
     jitter: float = 0.0
     """A sampled component's ticks are late by up to so much [s], uniformly distributed; the same in every run."""
+    process: Literal["shared", "own"] = "shared"
+    """``own``: its FMU runs in a separate process in any case; otherwise where it cannot share one."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +58,12 @@ class Connection:
 
 @dataclass(frozen=True)
 class Connector:
-    """A variable of the system itself: an input that drives inputs of components, or an output that shows one."""
+    """A variable of the system itself: an input or parameter that drives those of components, or an output."""
 
     name: str
-    causality: Literal["input", "output"]
+    causality: Literal["input", "output", "parameter"]
     pins: tuple[tuple[tuple[str, str], float, float], ...]
-    """((component, variable), factor, offset). Input: pin = factor * connector + offset; output (one pin):
+    """((component, variable), factor, offset). Input, parameter: pin = factor * connector + offset; output (one pin):
     connector = factor * pin + offset."""
     unit: str = ""
     description: str = ""
@@ -77,6 +79,8 @@ class System:
     components: tuple[Component, ...]
     connections: tuple[Connection, ...]
     connectors: tuple[Connector, ...] = ()
+    notes: tuple[str, ...] = field(default=(), compare=False)
+    """What reading it left out, each in a sentence."""
 
     def component(self, name: str) -> Component:
         """Return a component; FmuError if there is none of that name."""
@@ -158,7 +162,7 @@ def checked(system: System) -> System:
         "input",
     )
     connectors = tuple(_checked_connector(system, c, writers) for c in system.connectors)
-    return System(system.name, system.components, tuple(connections), connectors)
+    return replace(system, connections=tuple(connections), connectors=connectors)
 
 
 def _disturbance(connection: Connection, target: Variable) -> str:
@@ -176,10 +180,14 @@ def _unique(names: Sequence[str], what: str) -> None:
 
 
 def _claim(
-    pin: tuple[str, str], variable: Variable, writer: str, writers: dict[tuple[str, str], str]
+    pin: tuple[str, str],
+    variable: Variable,
+    writer: str,
+    writers: dict[tuple[str, str], str],
+    takes: Sequence[str] = ("input",),
 ) -> None:
     name = ".".join(pin)
-    if variable.causality != "input":
+    if variable.causality not in takes:
         raise FmuError(f"connection {writer}: {name} is no input but of causality {variable.causality!r}.")
     if pin in writers:
         raise FmuError(f"{name} has two writers, {writers[pin]} and {writer}; keep one.")
@@ -193,12 +201,13 @@ def _checked_connector(
     unit = connector.unit
     for pin, factor, offset in connector.pins:
         variable = system.variable(pin)
-        if connector.causality == "input":
-            _claim(pin, variable, f"connector {connector.name}", writers)
+        if connector.causality != "output":
+            takes = ("input",) if connector.causality == "input" else ("parameter", "input")
+            _claim(pin, variable, f"connector {connector.name}", writers, takes)
         unit = unit or variable.unit or ""
         scale, shift = 1.0, 0.0
         if connector.convert and variable.unit and unit and variable.unit != unit:
-            pair = (unit, variable.unit) if connector.causality == "input" else (variable.unit, unit)
+            pair = (variable.unit, unit) if connector.causality == "output" else (unit, variable.unit)
             try:
                 scale, shift = conversion(*pair)
             except UnitError as error:
@@ -246,8 +255,8 @@ def default_execution(fmu: FmuDescription, step: float | None) -> Execution:
 
 
 def connected_inputs(system: System) -> frozenset[tuple[str, str]]:
-    """Return inputs of components that a connection or an input connector writes."""
+    """Return inputs (and parameters) of components that a connection or a connector writes."""
     pins: Iterable[tuple[str, str]] = (
-        pin for c in system.connectors if c.causality == "input" for pin, *_ in c.pins
+        pin for c in system.connectors if c.causality != "output" for pin, *_ in c.pins
     )
     return frozenset(c.target for c in system.connections) | frozenset(pins)

@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from thsa_cosim.fmu.description import DefaultExperiment, Variable
-from thsa_cosim.ssv import SSV
+from thsa_cosim.ssv import SSC, SSV
 from thsa_cosim.system.description import SystemDescription
-from thsa_cosim.system.ssp import ANNOTATION, ROOT, SSC, SSD
+from thsa_cosim.system.ssp import ANNOTATION, ROOT, SSD
 from thsa_cosim.system.structure import Component, System
 
 _TYPES = {"Real": "Real", "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration"}
@@ -69,7 +69,7 @@ def _structure(system: System, experiment: DefaultExperiment) -> bytes:
         for (element, name), factor, offset in connector.pins:
             inner = {"Element": element, "Connector": name}
             outer = {"Connector": connector.name}
-            start, end = (outer, inner) if connector.causality == "input" else (inner, outer)
+            start, end = (inner, outer) if connector.causality == "output" else (outer, inner)
             _link(links, start, end, factor, offset)
     for connection in system.connections:
         start = dict(zip(("Element", "Connector"), connection.source, strict=True))
@@ -141,6 +141,8 @@ def _component(parent: ET.Element, component: Component) -> None:
         how["delay"] = repr(component.delay)
     if component.jitter:
         how["jitter"] = repr(component.jitter)
+    if component.process == "own":
+        how["process"] = "own"
     _annotate(element, "Execution", how)
 
 

@@ -17,6 +17,7 @@ from thsa_cosim.diagnosis.blackbox.drive import Drive, measure_drive
 from thsa_cosim.diagnosis.blackbox.places import find_places
 from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
 from thsa_cosim.diagnosis.blackbox.wrapper import EffectWrapper, Term, laws, sign_of
+from thsa_cosim.diagnosis.catalogue.known import known_effects
 from thsa_cosim.errors import FmuError, ScenarioError
 from thsa_cosim.fmu import Plant
 from thsa_cosim.scenario import BlackBoxSpec, load
@@ -110,9 +111,19 @@ def test_more_friction_of_the_nut_acts_through_the_load() -> None:
         start = plant.description.variables["nut.F_fn.a0"].start
         assert isinstance(start, float)
         inside = plant.run({**FIXED, "nut.F_fn.a0": start + 800.0}, INPUTS, OUTPUTS, TIME, tolerance=1e-5)
-    around = run(wrapper("load", "friction-run-in", "FrictionRunIn", dF=800.0, d_r=1e9))
+    around = run(wrapper("load", "plain-friction", "PlainFriction", F_C=800.0, b=0.0))
     assert distance(base, inside) > 1.0
     assert distance(around, inside) < 0.2 * distance(base, inside)
+
+
+def test_plain_friction_is_offered_at_the_load_of_a_black_box_alone() -> None:
+    """Models with source declare Coulomb and viscous friction at every place."""
+    variants = known_effects()["plain-friction"].variants
+    assert {v.slots for v in variants} == {("load",)}
+    assert [p.name for v in variants for p in v.parameters] == ["F_C", "b"]
+    at = {"s": np.array([-1.0, 0.0, 1.0]), "v": np.array([-2.0, 0.0, 3.0])}
+    law = laws(None)["plain-friction", "PlainFriction"]
+    assert law({"F_C": 5.0, "b": 7.0}, at).tolist() == [-19.0, 0.0, 26.0]
 
 
 def test_neutral_wrapper_is_the_fmu() -> None:

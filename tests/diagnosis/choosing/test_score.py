@@ -199,3 +199,44 @@ def test_fixed_shapes_are_those_of_the_accepted_proposals():
     made: Any = [SimpleNamespace(candidate=SimpleNamespace(parameters=parameters), proposal=proposal)]
     assert fixed_shapes(made) == {"x.n": 7.0}
     assert fixed_shapes([]) == {}
+
+
+CHANNEL = SimpleNamespace(
+    name="v", measured=np.zeros(4000), time=np.arange(4000) * 5e-3, noise=1.0, weight=1.0
+)
+TRIALS: Any = (
+    SimpleNamespace(case=SimpleNamespace(channels=(CHANNEL,), measured=SimpleNamespace(units={"v": "m/s"}))),
+)
+SMOOTH, NOISE = 3.0 * np.sin(CHANNEL.time), np.random.default_rng(8).standard_normal(4000)
+
+
+def scored_on(held: np.ndarray, validate: np.ndarray | None) -> Scored | None:
+    """The score of a fit that leaves ``validate`` of what was ``held``."""
+    bench: Any = SimpleNamespace(of=lambda part: TRIALS, residuals=lambda unknowns, vectors, part: [validate])
+    nothing: Any = SimpleNamespace()
+    return room._scored(bench, nothing, fit(2.0, 1.0, 100.0), fit(1.0, 4.0, 400.0), held)
+
+
+def test_a_score_is_what_the_held_out_recordings_lose():
+    found = scored_on(SMOOTH + NOISE, 0.5 * SMOOTH + NOISE)
+    assert found is not None
+    assert found.fit_gain == pytest.approx(300.0)
+    before, after = np.sum((SMOOTH + NOISE) ** 2), np.sum((0.5 * SMOOTH + NOISE) ** 2)
+    assert found.held_out_gain == pytest.approx(before - after, rel=1e-3)
+    assert found.share == pytest.approx(0.75, abs=0.01)
+    assert found.consistency > 5.0
+    worse = scored_on(0.5 * SMOOTH + NOISE, SMOOTH + NOISE)
+    assert worse is not None
+    assert worse.held_out_gain < 0.0
+    assert worse.share == pytest.approx(-3.0, abs=0.2)
+    assert worse.consistency < -3.0, "what grows in every block is no gain"
+    assert scored_on(SMOOTH + NOISE, None) is None
+
+
+def test_of_small_structure_the_share_is_one_of_it_and_of_none_nothing():
+    small = scored_on(0.1 * SMOOTH + NOISE, NOISE)
+    assert small is not None
+    assert small.share > 0.7
+    none = scored_on(np.zeros(4000), np.zeros(4000))
+    assert none is not None
+    assert (none.share, none.held_out_gain) == (0.0, 0.0)

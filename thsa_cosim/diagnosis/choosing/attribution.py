@@ -131,14 +131,10 @@ def attribute(
         if offered is candidates:
             break
     accepted, current, current_held, notes = prune(bench, unknowns, weights, accepted, current, current_held)
-    while accepted and (name := out_of_range(current)):
-        notes.append(f"{accepted[-1].candidate.name} was dropped: it drives {name} to the end of its range")
-        accepted = accepted[:-1]
-        current = accepted[-1].fit if accepted else base
-        fallen = bench.residuals(current.unknowns, current.vector[None, :], "validate")[0]
-        if fallen is None:
-            return None
-        current_held = fallen
+    kept = _within_range(bench, accepted, base, current, current_held)
+    if kept is None:
+        return None
+    accepted, current, current_held, ended = kept
     return Attribution(
         base,
         base_cost,
@@ -147,8 +143,24 @@ def attribute(
         current,
         weights.plain(weights.base_held, "validate"),
         weights.plain(current_held, "validate"),
-        tuple(notes),
+        (*notes, *ended),
     )
+
+
+def _within_range(
+    bench: Bench, accepted: list[Scored], base: Fit, current: Fit, held: FloatArray
+) -> tuple[list[Scored], Fit, FloatArray, list[str]] | None:
+    """Drop the last effect as long as a declared parameter ends at its range; None if what is left does not run."""
+    notes: list[str] = []
+    while accepted and (name := out_of_range(current)):
+        notes.append(f"{accepted[-1].candidate.name} was dropped: it drives {name} to the end of its range")
+        accepted = accepted[:-1]
+        current = accepted[-1].fit if accepted else base
+        fallen = bench.residuals(current.unknowns, current.vector[None, :], "validate")[0]
+        if fallen is None:
+            return None
+        held = fallen
+    return accepted, current, held, notes
 
 
 def _is_known(candidate: Candidate, fit: Fit) -> bool:

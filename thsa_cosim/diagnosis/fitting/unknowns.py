@@ -1,11 +1,12 @@
 """The unknowns of a fit: declared parameters (with what the drawing says of them) and an effect's parameters."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
+from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.search import Box
 from thsa_cosim.signals import FloatArray
 
@@ -93,6 +94,16 @@ class Unknowns:
     def named(self, vector: FloatArray) -> Mapping[str, float]:
         """Values by name."""
         return dict(zip(self.names, vector.tolist(), strict=True))
+
+
+def declared_unknowns_of(effects: Sequence[DeclaredEffect]) -> tuple[Unknown, ...]:
+    """The parameters of known effects as declared unknowns, of which only the start is known; each variable once."""
+    found = {
+        u.name: replace(u, start=effect.starts[u.name.rpartition(".")[2]], declared=True)
+        for effect in effects
+        for u in unknowns_of(effect.candidate, effect.starts)
+    }
+    return tuple(found.values())
 
 
 def unknowns_of(candidate: Candidate, shapes: Mapping[str, float]) -> tuple[Unknown, ...]:

@@ -182,7 +182,7 @@ static void commit(Instance *c, double time, const double *g_end, double from, c
     if (c->s.inputs_moving)
         for (int k = 0; k < N_U; k++) now->u[k] = u_from[k] + (time - from) * c->s.du[k];
     if (g_end)
-        for (int k = 0; k < N_G; k++) now->span[k] = fmax(now->span[k], fabs(g_end[k]));
+        for (int k = 0; k < N_G; k++) instance_widen_span(now, k, g_end[k]);
     instance_changed(c);
 }
 

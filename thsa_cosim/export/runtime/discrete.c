@@ -111,7 +111,7 @@ static int tick(Instance *c) {
     int due = 0;
     if (!N_T) return 0;
     double table[2 * N_T + 2];
-    model_samples(s->p, s->d, table);
+    model_samples(s->p, s->d, s->now.m, table);
     for (int k = 0; k < N_T; k++) {
         const double start = table[2 * k], interval = table[2 * k + 1];
         if (s->now.next[k] > s->now.time + discrete_grain(s->now.time)) continue;
@@ -128,7 +128,7 @@ static void first_ticks(Instance *c) {
     State *s = &c->s;
     if (!N_T) return;
     double table[2 * N_T + 2];
-    model_samples(s->p, s->d, table);
+    model_samples(s->p, s->d, s->now.m, table);
     for (int k = 0; k < N_T; k++) {
         const double start = table[2 * k], interval = table[2 * k + 1], behind = s->now.time - start;
         s->now.next[k] = start;
@@ -157,6 +157,16 @@ void discrete_reset(Instance *c) {
     memset(m, 0, sizeof c->s.now.m);
     *initial_of(c) = 1.0;
     c->s.states_jumped = 0;
+}
+
+/* Before the first turn z is pre(z), which the equations may need: a parameter that the initial equations determine. */
+void discrete_preset(Instance *c) {
+    const State *s = &c->s;
+    double start[N_Z + 1];
+    if (!N_Z || model_discrete_start(POINT, s->x_start, start)) return;
+    for (int k = 0; k < N_Z; k++)
+        if (is_finite(start[k])) z_of(c)[k] = before_of(c)[k] = start[k];
+    instance_changed(c);
 }
 
 /* One turn of the initialization: pre(z) from its start values, then z. */

@@ -5,6 +5,7 @@
 #include "solver.h"
 
 Status discrete_update(Instance *c);                /* event iteration at the present point */
+void discrete_preset(Instance *c);                  /* z before the initialization */
 Status discrete_start(Instance *c, int *changed);   /* one turn of the initialization */
 Status discrete_started(Instance *c);               /* ends the initialization; the first event */
 void discrete_reset(Instance *c);                   /* m before the initialization */

@@ -185,7 +185,7 @@ int instance_switch_modes(Instance *c, int report) {
         const double band = instance_dead_band(c, k);
         double wanted = c->g[k] >= band ? 1.0 : c->g[k] <= -band || c->g[k] == 0.0 ? 0.0 : now->m[k];
         if (N_TIMED && c->slope[k] != 0.0) wanted = c->g[k] > grain * fabs(c->slope[k]) ? 1.0 : 0.0; /* its instant is met */
-        now->span[k] = fmax(now->span[k], fabs(c->g[k]));
+        instance_widen_span(now, k, c->g[k]);
         if (wanted == now->m[k]) continue;
         now->m[k] = wanted;
         widen(c, k);
@@ -246,6 +246,9 @@ Status instance_initialize(Instance *c) {
         if (model_initial(s->now.time, s->now.u, s->p, s->d, s->now.m, s->x_start, s->now.x) ||
             !all_finite(s->now.x, N_X))
             return not_initialized(c, "the initial equations have no solution");
+#if N_EVENTS
+        if (i == 0) discrete_preset(c);
+#endif
         if (instance_indicators(c) != OK) return not_initialized(c, "a relation cannot be evaluated");
         int changed = instance_switch_modes(c, 0);
 #if N_EVENTS

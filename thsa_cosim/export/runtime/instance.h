@@ -7,6 +7,7 @@
 #ifndef THSA_INSTANCE_H
 #define THSA_INSTANCE_H
 
+#include <math.h>
 #include <stddef.h>
 #include "model.h"
 
@@ -148,5 +149,10 @@ void snapshot_write(const Snapshot *in, unsigned char *bytes);
 Status snapshot_read(Instance *c, const unsigned char *bytes, size_t size, Snapshot **out);
 
 static inline int is_finite(double v) { return v - v == 0.0; }
+
+/* The largest |g| so far, of which the dead band is a share; less what stands for infinity ("never", "not yet"). */
+static inline void instance_widen_span(Motion *now, int k, double g) {
+    if (fabs(g) > now->span[k] && fabs(g) < 1e90) now->span[k] = fabs(g);
+}
 
 #endif

@@ -57,7 +57,7 @@ int model_first_indicators(double t, const double *u, const double *p, const dou
                            const double *x_start, double *g); /* relations at the start values */
 int model_reinit(MODEL_POINT, double *x_new);         /* states after an event */
 int model_time_slopes(MODEL_POINT, double *s);        /* dg/dt of relations that are time events, 0 of the others */
-int model_samples(const double *p, const double *d, double *s); /* start and interval of each sample */
+int model_samples(const double *p, const double *d, const double *m, double *s); /* start and interval of each sample */
 int model_assertions(MODEL_POINT, double *a);       /* nonzero where violated */
 extern const char *const model_assertion_text[];
 

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from thsa_cosim import __version__
 from thsa_cosim.diagnosis.blackbox.prepare import BlackBox, wrap_black_box
@@ -80,7 +81,9 @@ def diagnose(scenario: Scenario, place: Place) -> DiagnosisResult:
     trials = trials_of(scenario)
     unknowns = declared_unknowns(scenario, trials)
     effects = choose(known_effects(spec.catalogue), spec.effects, f"{scenario.path}: diagnose.effects")
-    with Study.open(place, study_identity(scenario), describe(scenario)) as study:
+    # One thread: the matrices are tall and narrow, and the simulations have the other cores.
+    one_thread = threadpool_limits(limits=1, user_api="blas")
+    with one_thread, Study.open(place, study_identity(scenario), describe(scenario)) as study:
         result = _diagnose(scenario, spec, study, trials, unknowns, effects.values())
         study.complete()
     return result
@@ -131,7 +134,15 @@ def _diagnose(
         machine = machine_of(tested.slots, tested.signals_at(at_start))
         scan = wave_number_finder(bench, tested.slots, tested.signals_at, machine)
         found = attribute(
-            bench, unknowns, tested.candidates, scan, start=start, seed=scenario.seed, most=spec.most, say=say
+            bench,
+            unknowns,
+            tested.candidates,
+            scan,
+            start=start,
+            seed=scenario.seed,
+            most=spec.most,
+            machine=machine,
+            say=say,
         )
     if found is None:
         reason = next(iter(bench.failures), "no run succeeded")

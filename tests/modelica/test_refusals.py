@@ -134,7 +134,8 @@ def test_a_homotopy_makes_no_difference_while_the_model_runs(tmp_path: Path) -> 
         ("model M parameter Real m = 0; Real x(start=1, fixed=true); Real y; equation der(x) = -x; m*y = x; end M;",
          "singular with the parameters as they are: y cannot be solved from"),
     ],
-    ids=["several solutions", "types", "operator record", "no output", "not assigned", "partial", "sample at a variable pace", "zero coefficient"],
+    ids=["several solutions", "types", "operator record", "no output", "not assigned",
+         "partial", "sample at a variable pace", "zero coefficient"],
 )  # fmt: skip
 def test_what_would_be_wrong_is_refused_by_name(tmp_path: Path, source: str, said: str) -> None:
     file = tmp_path / "M.mo"

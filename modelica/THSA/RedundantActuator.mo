@@ -23,27 +23,55 @@ model RedundantActuator "THSA with two motor lanes, active and standby, and two 
   parameter THSA.Units.Time t_sensor(min=-1, max=1e9) = 1e9 "Failure: time from which the output's velocity sensor reads 0";
   parameter THSA.Units.Torque T_jam(min=0, max=1e6) = 3000 "Torque of a jam or of the lock at the screw";
   THSA.Redundancy.Monitor monitor "Active and standby";
-  THSA.Redundancy.Lane laneA(tau_f=motorEffect.F) "Lane A, active";
-  THSA.Redundancy.Lane laneB "Lane B, standby";
+  THSA.Redundancy.Lane laneA(tau_f=motorAEffect.F, du=inverterAEffect.du, g_R=windingAEffect.g_R, g_psi=windingAEffect.g_psi,
+    g_t=torqueAEffect.g_t, g_e=torqueAEffect.g_e, d_i=currentSensorAEffect.d) "Lane A, active";
+  THSA.Redundancy.Lane laneB(tau_f=motorBEffect.F, du=inverterBEffect.du, g_R=windingBEffect.g_R, g_psi=windingBEffect.g_psi,
+    g_t=torqueBEffect.g_t, g_e=torqueBEffect.g_e, d_i=currentSensorBEffect.d) "Lane B, standby";
   THSA.Redundancy.Differential differential "Differential";
   THSA.Gearbox gearbox(tau_f=gearboxEffect.F + (if time >= t_jam or monitor.locked then T_jam*gearbox.friction.s else 0)) "Gearbox";
   THSA.NoBack noBack "No-back device";
-  THSA.Redundancy.LoadPath primary "Primary load path: roller screw and nut";
-  THSA.Redundancy.LoadPath secondary(k_s=1.5e8, d_s=2.5e5, gap=1e-3) "Secondary load path: tie rod and its nut";
-  THSA.Nut nut(F_f=if primary.broken then -nut.friction.F_f else screwEffect.F) "Nut; a broken path takes its friction along";
+  THSA.Redundancy.LoadPath primary(e=contactPrimaryEffect.e, v_e=contactPrimaryEffect.v_e, k_e=contactPrimaryEffect.k_e)
+    "Primary load path: roller screw and nut";
+  THSA.Redundancy.LoadPath secondary(k_s=1.5e8, d_s=2.5e5, gap=1e-3, e=contactSecondaryEffect.e, v_e=contactSecondaryEffect.v_e,
+    k_e=contactSecondaryEffect.k_e) "Secondary load path: tie rod and its nut";
+  THSA.Nut nut(F_f=(if primary.broken then -nut.friction.F_f else screwPrimaryEffect.F)
+    + screwSecondaryEffect.F) "Nuts; a broken path takes its friction along";
   THSA.Stabilizer stabilizer "Stabilizer";
   THSA.VelocitySensor sensor "Velocity sensor";
   replaceable THSA.Thermal.GivenTemperatures temperatures constrainedby THSA.Interfaces.PartTemperatures
     "Slot: temperatures of the parts";
-  replaceable THSA.Effects.NoFriction motorEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
-    constrainedby THSA.Interfaces.FrictionEffect
-    "Slot: friction and torques at motor A";
-  replaceable THSA.Effects.NoFriction gearboxEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m"))
-    constrainedby THSA.Interfaces.FrictionEffect
+  replaceable THSA.Effects.IdealInverter inverterAEffect constrainedby THSA.Interfaces.VoltageEffect
+    "Slot: voltage of the inverter of lane A";
+  replaceable THSA.Effects.NoHeating windingAEffect constrainedby THSA.Interfaces.HeatingEffect
+    "Slot: heating of winding and magnets of motor A";
+  replaceable THSA.Effects.ConstantTorqueConstant torqueAEffect constrainedby THSA.Interfaces.TorqueConstantEffect
+    "Slot: torque constant of motor A";
+  replaceable THSA.Effects.NoFriction motorAEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m")) constrainedby THSA.Interfaces.FrictionEffect
+    "Slot: friction and torques at motor A and its brake";
+  replaceable THSA.Effects.IdealSensor currentSensorAEffect(u(unit="A"), d(unit="A")) constrainedby THSA.Interfaces.SensorEffect
+    "Slot: sensor of the current of lane A [A], which its loop uses";
+  replaceable THSA.Effects.IdealInverter inverterBEffect constrainedby THSA.Interfaces.VoltageEffect
+    "Slot: voltage of the inverter of lane B";
+  replaceable THSA.Effects.NoHeating windingBEffect constrainedby THSA.Interfaces.HeatingEffect
+    "Slot: heating of winding and magnets of motor B";
+  replaceable THSA.Effects.ConstantTorqueConstant torqueBEffect constrainedby THSA.Interfaces.TorqueConstantEffect
+    "Slot: torque constant of motor B";
+  replaceable THSA.Effects.NoFriction motorBEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m")) constrainedby THSA.Interfaces.FrictionEffect
+    "Slot: friction and torques at motor B and its brake";
+  replaceable THSA.Effects.IdealSensor currentSensorBEffect(u(unit="A"), d(unit="A")) constrainedby THSA.Interfaces.SensorEffect
+    "Slot: sensor of the current of lane B [A], which its loop uses";
+  replaceable THSA.Effects.NoFriction gearboxEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m")) constrainedby THSA.Interfaces.FrictionEffect
     "Slot: friction and torques at the gearbox's output shaft";
-  replaceable THSA.Effects.NoFriction screwEffect(v(unit="m/s"), z(unit="m"), N(unit="N"), F(unit="N"))
-    constrainedby THSA.Interfaces.FrictionEffect
-    "Slot: friction between screw and nut";
+  replaceable THSA.Effects.NoContact contactPrimaryEffect constrainedby THSA.Interfaces.ContactEffect
+    "Slot: contact of screw and nut of the primary load path";
+  replaceable THSA.Effects.NoFriction screwPrimaryEffect(v(unit="m/s"), z(unit="m"), N(unit="N"), F(unit="N")) constrainedby THSA.Interfaces.FrictionEffect
+    "Slot: friction of the primary load path's nut";
+  replaceable THSA.Effects.NoContact contactSecondaryEffect constrainedby THSA.Interfaces.ContactEffect
+    "Slot: contact of screw and nut of the secondary load path";
+  replaceable THSA.Effects.NoFriction screwSecondaryEffect(v(unit="m/s"), z(unit="m"), N(unit="N"), F(unit="N")) constrainedby THSA.Interfaces.FrictionEffect
+    "Slot: friction of the secondary load path's nut";
+  replaceable THSA.Effects.IdealSensor velocitySensorEffect(u(unit="m/s"), d(unit="m/s")) constrainedby THSA.Interfaces.SensorEffect
+    "Slot: sensor of the output velocity [m/s]";
   THSA.Units.Power P_loss "All that becomes heat";
   THSA.Units.Energy E_stored "Energy of masses, windings and contacts";
   THSA.Units.Energy E_net(nominal=10) "Energy that has come in and has neither gone out nor become heat";
@@ -87,24 +115,49 @@ equation
   connect(temperatures.winding, laneB.T_w);
   connect(temperatures.gearbox, gearbox.T);
   connect(temperatures.screw, nut.T);
-  motorEffect.v = laneA.motor.w_m;
-  motorEffect.s = laneA.motor.friction.s;
-  motorEffect.z = laneA.motor.phi;
-  motorEffect.N = laneA.motor.tau_e;
+  inverterAEffect.i_q = laneA.motor.i_q;
+  windingAEffect.P = laneA.motor.P_co;
+  torqueAEffect.i_q = laneA.motor.i_q;
+  motorAEffect.v = laneA.motor.w_m;
+  motorAEffect.s = laneA.motor.friction.s;
+  motorAEffect.z = laneA.motor.phi;
+  motorAEffect.N = laneA.motor.tau_e;
+  currentSensorAEffect.u = laneA.motor.i_q;
+  inverterBEffect.i_q = laneB.motor.i_q;
+  windingBEffect.P = laneB.motor.P_co;
+  torqueBEffect.i_q = laneB.motor.i_q;
+  motorBEffect.v = laneB.motor.w_m;
+  motorBEffect.s = laneB.motor.friction.s;
+  motorBEffect.z = laneB.motor.phi;
+  motorBEffect.N = laneB.motor.tau_e;
+  currentSensorBEffect.u = laneB.motor.i_q;
   gearboxEffect.v = gearbox.w_g;
   gearboxEffect.s = gearbox.friction.s;
   gearboxEffect.z = gearbox.flange_b.phi;
   gearboxEffect.N = noBack.tau_s;
-  screwEffect.v = nut.v;
-  screwEffect.s = nut.friction.s;
-  screwEffect.z = stabilizer.x;
-  screwEffect.N = primary.F_s + secondary.F_s;
-  v = if time >= t_sensor then 0 else sensor.y;
+  contactPrimaryEffect.phi = primary.flange_a.phi;
+  contactPrimaryEffect.w = noBack.w;
+  contactPrimaryEffect.delta = primary.delta;
+  contactPrimaryEffect.v_s = primary.v_s;
+  screwPrimaryEffect.v = nut.v;
+  screwPrimaryEffect.s = nut.friction.s;
+  screwPrimaryEffect.z = stabilizer.x;
+  screwPrimaryEffect.N = primary.F_s;
+  contactSecondaryEffect.phi = secondary.flange_a.phi;
+  contactSecondaryEffect.w = noBack.w;
+  contactSecondaryEffect.delta = secondary.delta;
+  contactSecondaryEffect.v_s = secondary.v_s;
+  screwSecondaryEffect.v = nut.v;
+  screwSecondaryEffect.s = nut.friction.s;
+  screwSecondaryEffect.z = stabilizer.x;
+  screwSecondaryEffect.N = secondary.F_s;
+  velocitySensorEffect.u = sensor.y;
+  v = if time >= t_sensor then 0 else sensor.y + velocitySensorEffect.d;
   x = stabilizer.x;
   w_A = laneA.w_s;
   w_B = laneB.w_s;
-  i_A = laneA.motor.i_q;
-  i_B = laneB.motor.i_q;
+  i_A = laneA.currentController.measurement;
+  i_B = laneB.currentController.measurement;
   u_A = laneA.motor.u_q;
   u_B = laneB.motor.u_q;
   F_1 = primary.F_s;
@@ -124,6 +177,8 @@ load path is loaded, whose nut then locks the screw.</p>
 <p>Failures are parameters, the times from which they are there: <code>laneA.t_loss</code>, <code>laneA.t_sensor</code>,
 <code>laneA.t_jam</code>, <code>laneA.brake.t_stuck</code>, <code>laneA.brake.t_slip</code>, the same of lane B,
 <code>t_jam</code> of the screw, <code>t_sensor</code> of the output's sensor, <code>primary.t_rupture</code>.</p>
+<p>Effects have a slot in every lane (<code>motorAEffect</code>, <code>motorBEffect</code>) and in either load path
+(<code>contactPrimaryEffect</code>, <code>screwSecondaryEffect</code>).</p>
 <p><code>E_res</code> is what the energy balance lacks: electrical energy in, less work on the surroundings, less heat, less
 the change of the stored energy. Ideally it is 0.</p></html>"),
     Icon(graphics={Rectangle(extent={{-100,100},{100,-100}}, lineColor={0,60,100}, fillColor={255,255,255}, fillPattern=FillPattern.Solid),

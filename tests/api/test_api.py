@@ -14,6 +14,8 @@ from small_scenario import toml
 
 import thsa_cosim as tc
 from thsa_cosim.errors import InputError, ScenarioError
+from thsa_cosim.report.signal_files import write_signals
+from thsa_cosim.signals import Signals
 
 ROOT = Path(__file__).parents[2]
 SCENARIOS = ROOT / "scenarios"
@@ -204,6 +206,27 @@ def test_a_diagnosis_tells_effects_and_held_out_errors(tmp_path: Path) -> None:
     assert isinstance(study, tc.DiagnoseStudy)
     assert study.effects.loc[("windage:motor", "b_q"), "value"] == 6e-6
     assert study.held_out.loc["v", "after"] == 2e-5
+
+
+def test_recordings_of_a_diagnosis_are_those_of_its_last_model(tmp_path: Path) -> None:
+    """Two recordings of one name are told apart by their role."""
+    error = {"rmse": 4e-5, "noise": 2e-5}
+    before = {"fit/ramp": {"v": error}, "validate/ramp": {"v": error | {"rmse": 6e-5}}}
+    found = {
+        "kind": "diagnose",
+        "status": "complete",
+        "before": {"recordings": before},
+        "after": {"recordings": {}},
+    }
+    measured = Signals(np.arange(3) * 0.1, {"v": np.array([0.0, 4e-3, -4e-3])}, {"v": "m/s"})
+    for role in ("fit", "validate"):
+        write_signals(tmp_path, role, "ramp", {"measured": measured, "before": measured})
+    (tmp_path / "result.json").write_text(json.dumps(found))
+    row = tc.open_study(tmp_path).recordings.loc[("validate", "ramp", "v")]
+    assert dict(row) == {"rmse": 6e-5, "noise": 2e-5, "rmse / noise": 3.0, "nrmse": 0.0075, "unit": "m/s"}
+    found["after"] = {"recordings": before | {"fit/ramp": {"v": error | {"rmse": 2e-5}}}}
+    (tmp_path / "result.json").write_text(json.dumps(found))
+    assert tc.open_study(tmp_path).recordings.loc[("fit", "ramp", "v"), "rmse / noise"] == 1.0
 
 
 def test_names_of_the_package() -> None:

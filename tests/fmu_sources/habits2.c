@@ -6,11 +6,14 @@
  * x before the first step. OTHER_START: the parameters start elsewhere than the model description says. PARTS: no step is
  * done further than 4 ms; what is left is for the next call. LICENCE=t: lost after so many seconds. JUMPS: y jumps by 1
  * after 0.2345 s. EULER: one explicit step per communication step. SLOW=t: each step takes so many microseconds.
- * NAN_ABOVE=u: y is no number where the input is above u.
+ * NAN_ABOVE=u: y is no number where the input is above u. ALONE: no other instance of any such FMU lives in the process.
+ * SETUP_FORGETS: fmi2SetupExperiment overwrites start values.
  */
 #include <math.h>
-#include <unistd.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include "fmi2Functions.h"
 
 typedef struct {
@@ -48,16 +51,31 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         return NULL;
     }
 #endif
+#ifdef ALONE
+    char here[32];
+    const char* lives = getenv("HABITS_LIVES"); /* one environment for all libraries of a process */
+    snprintf(here, sizeof here, "%d", (int)getpid());
+    if (lives && !strcmp(lives, here)) return NULL;
+    setenv("HABITS_LIVES", here, 1);
+#endif
     Model* m = callbacks->allocateMemory(1, sizeof(Model));
     m->callbacks = callbacks;
     start(m);
     return m;
 }
-void fmi2FreeInstance(fmi2Component c) { ((Model*)c)->callbacks->freeMemory(c); }
+void fmi2FreeInstance(fmi2Component c) {
+#ifdef ALONE
+    unsetenv("HABITS_LIVES");
+#endif
+    ((Model*)c)->callbacks->freeMemory(c);
+}
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerant, fmi2Real tolerance, fmi2Real t0,
                                fmi2Boolean stops, fmi2Real stop) {
     (void)c, (void)tolerant, (void)tolerance, (void)t0, (void)stops, (void)stop;
+#ifdef SETUP_FORGETS
+    start(c);
+#endif
     return fmi2OK;
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { (void)c; return fmi2OK; }

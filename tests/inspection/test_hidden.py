@@ -67,3 +67,4 @@ def test_a_delay_is_no_finding_below_what_the_sampling_makes() -> None:
     assert own_delay(time, np.sign(np.sin(30.0 * time))) == pytest.approx(1e-3)  # as fast as the sampling
     lost = time[np.random.default_rng(1).random(1000) > 0.4]
     assert own_delay(lost, np.sin(lost)) > 1.5e-3  # (1 + p) / (1 - p) steps, p = 0.4
+    assert own_delay(time, slow, held=True) == pytest.approx(1e-3)  # a step was anywhere between two samples

@@ -1,6 +1,7 @@
 """Samples that move a fitted value out of line with the rest: few that are far off, or a stretch of its own."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,3 +94,10 @@ def test_a_sensor_that_is_not_linear_is_not_explained() -> None:
     assert judge(fitted(*clean)[0]).verdict == "explained"
     reasons = judge(fitted(*bent)[0]).reasons
     assert any("depends on its own size" in reason for reason in reasons), reasons
+
+
+def test_values_that_are_not_determined_are_not_asked_for() -> None:
+    residuals, known = fitted(line("a", 3, lambda t, x: np.where((t > 1.5) & (t < 2.0), 0.97 * x, x)))
+    assert influences(residuals, [replace(p, stderr=None) for p in known]) == []
+    (finding,) = influences(residuals, [replace(known[0], stderr=None), known[1]])
+    assert "b changes" in finding.text

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thsa_cosim.api.study import Study, frame
+from thsa_cosim.api.study import RECORDING_COLUMNS, Study, frame
 from thsa_cosim.errors import InputError, did_you_mean, require
 
 if TYPE_CHECKING:
@@ -129,6 +129,26 @@ class DiagnoseStudy(Study):
     def verdict(self) -> str:
         """``missing-effect``, ``no-missing-effect``, ``unexplained-structure`` or ``not-tested``."""
         return str(self.result["verdict"])
+
+    @property
+    def recordings(self) -> "pd.DataFrame":
+        """As of every study, of the extended model; of the declared one where no effect was added."""
+        from thsa_cosim.costs import signal_range
+
+        after, before = (self.result[key].get("recordings", {}) for key in ("after", "before"))
+        errors, rows = after or before, {}
+        for file in self.files.values():
+            own = errors.get(file.name) or errors.get(f"{file.role}/{file.name}", {})
+            for signal, error in own.items():
+                span = signal_range(file.channels[signal]["measured"])
+                rows[file.role, file.name, signal] = {
+                    "rmse": error["rmse"],
+                    "noise": error["noise"],
+                    "rmse / noise": error["rmse"] / error["noise"] if error["noise"] else math.nan,
+                    "nrmse": error["rmse"] / span if span else math.nan,
+                    "unit": file.units.get(signal, "1"),
+                }
+        return frame(rows, ["role", "recording", "signal"], RECORDING_COLUMNS)
 
     @property
     def effects(self) -> "pd.DataFrame":

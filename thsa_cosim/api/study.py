@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from thsa_cosim.report.parts.drawing import Drawing
     from thsa_cosim.report.signal_files import SignalFile
 
+#: Columns of :attr:`Study.recordings`.
+RECORDING_COLUMNS = ("rmse", "noise", "rmse / noise", "nrmse", "unit")
+
 
 @dataclass(frozen=True, eq=False)
 class Study:
@@ -73,8 +76,7 @@ class Study:
             for part in self.parts("recordings")
             for signal, error in part["error"].items()
         }
-        columns = ("rmse", "noise", "rmse / noise", "nrmse", "unit")
-        return frame(rows, ["role", "recording", "signal"], columns)
+        return frame(rows, ["role", "recording", "signal"], RECORDING_COLUMNS)
 
     def signals(self, recording: str) -> "pd.DataFrame":
         """Signals of a recording: index time [s], columns (signal [unit], measured or simulated).

@@ -358,19 +358,25 @@ class LocalRunner(Closing):
         begun = bool(orders) and progress.serial == orders[0].serial
         if orders and (cause in _CHANNEL or (begun and (cause is None or orders[0].serial == accused))):
             order = orders.pop(0)
-            attempt = self._post_mortem(worker, code, cause, console)
+            attempt = self._post_mortem(worker, code, cause, console, order.experiment)
             batch.ended(batch.index.pop(order.serial), attempt)
         for order in reversed(orders):
             batch.pending.appendleft(batch.index.pop(order.serial))
 
     def _post_mortem(
-        self, worker: WorkerProcess, code: int, cause: tuple[Status, str] | None, console: str
+        self,
+        worker: WorkerProcess,
+        code: int,
+        cause: tuple[Status, str] | None,
+        console: str,
+        experiment: int,
     ) -> Attempt:
         """Say what the job in work died of."""
         progress = worker.last_progress
         status, reason = cause or self._cause_of_death(code, progress)
         lasted = time.monotonic() - (progress.began or worker.since)
-        outcome = Outcome(status, f"{reason} {progress.where}", None, None, lasted, console)
+        where = progress.where + self._study.component(experiment, progress.component)
+        outcome = Outcome(status, f"{reason} {where}", None, None, lasted, console)
         own = cause is None or cause in _CHANNEL
         fault = fault_of(outcome, self._study.trouble() if own else None)
         # Who kills the supervisor too has been looked for from inside: it is small, and holds no data.

@@ -21,6 +21,7 @@ from thsa_cosim.batch.inbox import Event, Inbox
 from thsa_cosim.batch.memory import resident_bytes
 from thsa_cosim.batch.worker import BEGAN, GROWTH, PROGRESS_SLOTS, SERIAL, read_console
 from thsa_cosim.fmu.instance import Phase
+from thsa_cosim.system.member import AT_WORK
 
 _BOOT = ("-P", str(Path(supervisor.__file__)))
 """The supervisor as a script, without its folder in sys.path."""
@@ -52,6 +53,8 @@ class Progress:
     """When its FMU was first touched (time.monotonic); None: not yet."""
     place: tuple[float, ...] = ()
     """Phase, time, step: two deaths at the same place are the FMU's doing."""
+    component: int = 0
+    """Number of the component of a system that was at work, from 1; 0 for none."""
 
 
 class WorkerProcess:
@@ -166,6 +169,7 @@ class WorkerProcess:
             int(values[GROWTH]),
             float(values[BEGAN]) or None,
             tuple(values[:3].tolist()),
+            int(values[AT_WORK]),
         )
 
     def console(self) -> str:

@@ -14,6 +14,7 @@ from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.machine import refuse_noexec, temporary_fault
 from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.system import read_description, unpack
+from thsa_cosim.system.description import SystemDescription
 
 
 class Study:
@@ -66,6 +67,15 @@ class Study:
             file = self.folder / "experiments" / f"{self.index[name]}.pickle"
             file.write_bytes(data)
             self._made += [file, *(p for p in self._fmu_folder(found).iterdir() if p.is_file())]
+
+    def component(self, experiment: int, number: int) -> str:
+        """Name the component of a system that was at work, as the end of a sentence; "" where it is no system."""
+        name = next(n for n, i in self.index.items() if i == experiment)
+        description = self.descriptions[name]
+        if not isinstance(description, SystemDescription) or not number:
+            return ""
+        parts = description.system.components
+        return f", in component {parts[number - 1].name}" if 0 < number <= len(parts) else ""
 
     def trouble(self) -> MachineError | None:
         """Say what is wrong with the temporary folder: gone, in part or whole, or nothing can be written."""

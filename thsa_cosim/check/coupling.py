@@ -12,6 +12,7 @@ from thsa_cosim.check.numerics import STEP_OK, STEP_WARNING, Judged
 from thsa_cosim.fmu.native import platform_folders
 from thsa_cosim.signals import Signals
 from thsa_cosim.system.description import SystemDescription, loops
+from thsa_cosim.system.member import own_processes
 from thsa_cosim.system.write import write_halved
 
 _NOTES = 3
@@ -28,6 +29,9 @@ def system_lines(description: SystemDescription) -> Iterator[tuple[str, Judged]]
     lacking = f"no library for this machine in {', '.join(missing)}"
     text = lacking if missing else "every component has a binary for here"
     yield "platform", (Verdict.FAILED if missing else Verdict.OK, text, {})
+    if apart := own_processes(description.system):
+        listed = "; ".join(f"{name} ({reason})" for name, reason in apart.items())
+        yield "own processes", (Verdict.OK, listed, {"components": len(apart)})
     if notes := description.system.notes:
         more = f" (and {len(notes) - _NOTES} more)" if len(notes) > _NOTES else ""
         yield "parameter sets", (Verdict.WARNING, " ".join(notes[:_NOTES]) + more, {"ignored": len(notes)})

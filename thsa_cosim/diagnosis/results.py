@@ -47,7 +47,15 @@ class Value:
 
 
 @dataclass(frozen=True)
-class FoundEffect:
+class KnownEffect:
+    """An effect that the scenario declares, with its parameters as identified, those of the last model."""
+
+    name: str
+    parameters: Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class FoundEffect(KnownEffect):
     """An effect that was added: its parameters, its equivalents in these recordings, and its probability."""
 
     name: str
@@ -233,3 +241,5 @@ class DiagnosisResult:
     """What is to be known about the recordings."""
     asked: Mapping[str, Any] = field(default_factory=dict)
     """The scenario as it was asked for, in its tables: what the extended model is identified with again."""
+    known: tuple[KnownEffect, ...] = ()
+    """Effects of the declared model; their parameters stand among the declared ones by FMU variable, too."""

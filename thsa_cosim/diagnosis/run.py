@@ -6,18 +6,26 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from thsa_cosim import __version__
 from thsa_cosim.diagnosis.blackbox.prepare import BlackBox, wrap_black_box
 from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
+from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect, declared_effects
 from thsa_cosim.diagnosis.catalogue.effect import Effect
 from thsa_cosim.diagnosis.catalogue.extend import write_extended_model
 from thsa_cosim.diagnosis.catalogue.known import choose, known_effects
 from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
-from thsa_cosim.diagnosis.choosing.findings import found_effects, judged, values_of
+from thsa_cosim.diagnosis.choosing.findings import (
+    found_effects,
+    judged,
+    known_values,
+    off_the_drawing,
+    values_of,
+)
 from thsa_cosim.diagnosis.choosing.orders import Machine, machine_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes, held_shapes
 from thsa_cosim.diagnosis.choosing.spread import between_models
@@ -36,7 +44,7 @@ from thsa_cosim.diagnosis.fitting.identified import Identified, identify_model
 from thsa_cosim.diagnosis.fitting.structure import errors, errors_by_recording
 from thsa_cosim.diagnosis.fitting.trials import Trial, spec_of, trials_of, with_fmu, with_wrapper
 from thsa_cosim.diagnosis.fitting.uncertainty import standard_errors
-from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
+from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, declared_unknowns_of
 from thsa_cosim.diagnosis.results import DiagnosisResult, EmpiricalLaw, StructuredError
 from thsa_cosim.errors import StudyError
 from thsa_cosim.export.compile import native_platform
@@ -66,7 +74,9 @@ def diagnose(scenario: Scenario, place: Place) -> DiagnosisResult:
     trials = trials_of(scenario)
     unknowns = declared_unknowns(scenario, trials)
     effects = choose(known_effects(spec.catalogue), spec.effects, f"{scenario.path}: diagnose.effects")
-    with Study.open(place, study_identity(scenario), describe(scenario)) as study:
+    # One thread: the matrices are tall and narrow, and the simulations have the other cores.
+    one_thread = threadpool_limits(limits=1, user_api="blas")
+    with one_thread, Study.open(place, study_identity(scenario), describe(scenario)) as study:
         result = _diagnose(scenario, spec, study, trials, unknowns, effects.values())
         study.complete()
     return result
@@ -85,6 +95,8 @@ def _diagnose(
     cases = [t.case for t in trials if t.part == "fit"]
     opening = partial(study.open_runner, scenario.simulation)
     tested: Superset | BlackBox
+    known: tuple[DeclaredEffect, ...] = ()
+    fmu = scenario.fmu.path
     if spec.model is None:
         say("measuring the drive of the black box")
         box = tested = wrap_black_box(scenario, cases, effects, opening)
@@ -93,9 +105,14 @@ def _diagnose(
         say("exporting the superset of all effects")
         box, tested = None, open_superset(scenario, spec.model, cases, effects, study.folder / WORK, opening)
         declared, driven = trials, with_fmu(trials, tested.fmu)
+        if spec.known:
+            known = declared_effects(tested.candidates, spec.known, f"{scenario.path}: diagnose.known")
+            unknowns = unknowns.with_members(declared_unknowns_of(known))
+            say(f"exporting the declared model with {', '.join(spec.known)}")
+            _, fmu = write_extended_model(study.folder / WORK, spec.model, spec.package, *_known(known))
     say("identifying the declared model from the drawing")
     before = identify_model(
-        scenario.fmu.path,
+        fmu,
         declared,
         unknowns,
         [unknowns.start],
@@ -103,20 +120,29 @@ def _diagnose(
         study.open_runner,
     )
     with study.open_runner(scenario.simulation, [t.experiment for t in driven]) as runner:
-        bench = Bench(runner, driven, held_shapes(tested.candidates))
+        given = {variable: value for effect in known for variable, value in effect.given.items()}
+        bench = Bench(runner, driven, {**held_shapes(tested.candidates), **given})
         start = before.fit.vector
         at_start = {t.case.name: unknowns.assignments(start, t.group) for t in driven if t.part == "fit"}
         machine = machine_of(tested.slots, tested.signals_at(at_start))
         scan = wave_number_finder(bench, tested.slots, tested.signals_at, machine)
         found = attribute(
-            bench, unknowns, tested.candidates, scan, start=start, seed=scenario.seed, most=spec.most, say=say
+            bench,
+            unknowns,
+            tested.candidates,
+            scan,
+            start=start,
+            seed=scenario.seed,
+            most=spec.most,
+            machine=machine,
+            say=say,
         )
     if found is None:
         reason = next(iter(bench.failures), "no run succeeded")
         raise StudyError(f"{scenario.path}: the model with all effects cannot be simulated: {reason}")
     names = tuple(effect.name for effect in effects)
     return _Closing(
-        scenario, spec, study, trials, unknowns, before, found, bench, names, machine, box
+        scenario, spec, study, trials, unknowns, before, found, bench, names, machine, known, box
     ).result()
 
 
@@ -134,6 +160,7 @@ class _Closing:
     bench: Bench
     effects: tuple[str, ...]
     machine: Machine
+    known: tuple[DeclaredEffect, ...]
     box: BlackBox | None = None
 
     def result(self) -> DiagnosisResult:
@@ -156,10 +183,13 @@ class _Closing:
                 )
                 assert self.spec.model is not None
                 model, extended = write_extended_model(
-                    self.study.folder, self.spec.model, self.spec.package, *_built(accepted, found.final)
+                    self.study.folder,
+                    self.spec.model,
+                    self.spec.package,
+                    *_built(self.known, accepted, found.final),
                 )
             self.study.place.say("identifying the extended model from the drawing")
-            after = self._identify(extended or scenario.fmu.path, wider, [wider.start, hint], accepted)
+            after = self._identify(extended or before.fmu, wider, [wider.start, hint], accepted)
             if self.box is not None:
                 values = {**after.trials[0].case.fixed, **after.fit.unknowns.named(after.fit.vector)}
                 wrapper = write_wrapper(self.study.folder, scenario.fmu.path, self.box.wrapper, values)
@@ -170,14 +200,15 @@ class _Closing:
         if verdict == "unexplained-structure" and self.box is None:
             self.study.place.say("looking for an empirical law")
             search = LawSearch(
-                scenario, self.spec, self.trials, self.unknowns, accepted, after, self.study.folder / WORK,
-                self.study.open_runner,
+                scenario, self.spec, self.trials, self.unknowns, self.known, accepted, after,
+                self.study.folder / WORK, self.study.open_runner,
             )  # fmt: skip
             terms = search.find()
             law = None if terms is None else law_of(terms, added=self.spec.empirical)
             if terms is not None and self.spec.empirical:
                 # The share stays that of the effects: a law describes and explains nothing.
                 model, extended, after = self._with_law(terms)
+        notes += off_the_drawing(after.fit)
         if model is not None and extended is not None:
             notes.append(
                 f"{extended.name} is for {native_platform().fmi3} only; thsa-cosim export {model}"
@@ -201,6 +232,7 @@ class _Closing:
             fmu_sha256=scenario.fmu.sha256,
             verdict=verdict,
             effects=found_effects(found, after.fit, self.machine, sure_after),
+            known=known_values(self.known, after.fit, sure_after),
             before=_errors(before),
             after=_errors(after) if changed else {"fit": {}, "validate": {}},
             recordings_before=_errors_by_recording(before),
@@ -238,16 +270,14 @@ class _Closing:
         if self.found.base_cost > self.before.fit.cost - 1.0:
             return self.before
         self.study.place.say("identifying the declared model, starting from the result of the search")
-        return self._identify(
-            self.scenario.fmu.path, self.unknowns, [self.before.fit.vector, base.vector], ()
-        )
+        return self._identify(self.before.fmu, self.unknowns, [self.before.fit.vector, base.vector], ())
 
     def _with_law(self, terms: Attribution) -> tuple[Path, Path, Identified]:
         """The model with its effects and an empirical law: class, FMU, identified."""
         assert self.spec.model is not None
         added = (*self.found.accepted, *terms.accepted)
         model, extended = write_extended_model(
-            self.study.folder, self.spec.model, self.spec.package, *_built(added, terms.final)
+            self.study.folder, self.spec.model, self.spec.package, *_built(self.known, added, terms.final)
         )
         wider = extended_unknowns(self.unknowns, added)
         hint = terms.final.at(wider.names)
@@ -262,10 +292,19 @@ class _Closing:
         return identify_model(fmu, trials, unknowns, starts, self.scenario.simulation, self.study.open_runner)
 
 
-def _built(accepted: Sequence[Scored], final: Fit) -> tuple[list[Candidate], dict[str, float]]:
+def _built(
+    known: Sequence[DeclaredEffect], accepted: Sequence[Scored], final: Fit
+) -> tuple[list[Candidate], dict[str, float]]:
     """The candidates of an extended model and the values that it starts with."""
-    values = {**final.unknowns.named(final.vector), **fixed_shapes(accepted)}
-    return [s.candidate for s in accepted], values
+    candidates, values = _known(known)
+    values |= {**final.unknowns.named(final.vector), **fixed_shapes(accepted)}
+    return [*candidates, *(s.candidate for s in accepted)], values
+
+
+def _known(known: Sequence[DeclaredEffect]) -> tuple[list[Candidate], dict[str, float]]:
+    """The candidates of a declared model's effects and their start values."""
+    values = {p.variable: effect.starts[p.name] for effect in known for p in effect.candidate.parameters}
+    return [effect.candidate for effect in known], values
 
 
 def _sure(identified: Identified) -> np.ndarray:

@@ -62,7 +62,7 @@ class Plant(Closing):
         """Take an FMU that is already unpacked into ``folder``; ``Plant.open`` is the usual way in.
 
         ``scratch`` holds ``folder`` and is removed by ``close``. ``progress`` (4,) is written while running:
-        phase, time [s], step, unused.
+        phase, time [s], step, number of the component of a system that is at work (from 1; 0: none).
         """
         self.description = description
         self.folder = folder

@@ -277,7 +277,7 @@ class _Search:
             data=Inspection.of((*scenario.data.findings, *slips), scenario.data.repairs),
             trust=judge(
                 self._residuals(),
-                (*_reasons(slips), *self._bounds(), *self._coupled()),
+                (*_reasons(slips), *self._undetermined(), *self._bounds(), *self._coupled()),
             ),
             coupling=self._coupling,
         )
@@ -314,6 +314,14 @@ class _Search:
 
     def _coupled(self) -> list[str]:
         return [] if self._coupling is None or not self._coupling.reason else [self._coupling.reason]
+
+    def _undetermined(self) -> list[str]:
+        """Points where no parameter is determined: whatever fits, it says nothing."""
+        return [
+            f"the recordings determine no parameter at {point.label}: they are too short, or nothing in them shows it"
+            for point in self._results()
+            if point.parameters and not any(e.identifiable for e in point.parameters.values())
+        ]
 
     def _bounds(self) -> list[str]:
         """Parameters that ended on a bound: the fit would have gone on."""

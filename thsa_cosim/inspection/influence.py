@@ -35,12 +35,18 @@ def influences(residuals: Sequence[Residual], parameters: Sequence[Expected]) ->
 
     The residuals are those of one fit, with slopes (n, p) in the parameters' order; without them nothing is said.
     """
-    if not residuals or any(r.slopes.shape != (r.values.size, len(parameters)) for r in residuals):
+    complete = [
+        r.slopes.shape == (r.values.size, len(parameters)) and r.time.size == r.values.size for r in residuals
+    ]
+    if not residuals or not all(complete):
         return []
     values = np.concatenate([r.values for r in residuals])
     slopes = np.concatenate([r.slopes for r in residuals])
-    if values.size < _LEAST or not (np.all(np.isfinite(values)) and np.all(np.isfinite(slopes))):
+    if values.size < _LEAST or all(p.stderr is None for p in parameters):
         return []
+    with np.errstate(over="ignore", invalid="ignore"):
+        if not np.isfinite(float(np.sum(values**2) + np.sum(slopes**2))):
+            return []
     fit = _Fit(values, slopes, parameters)
     few = list(_few_samples(fit, residuals))
     return few or list(_stretches(fit, residuals))
@@ -112,7 +118,7 @@ def _stretches(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
         for first, last in _pieces(len(recordings) > 1):
             normal = fit.normal - np.sum(normals[first:last], axis=0)
             moved = fit.step(normal, gradient - np.sum(gradients[first:last], axis=0)) - undone
-            with np.errstate(invalid="ignore"):  # of what nothing depends on
+            with np.errstate(divide="ignore", invalid="ignore"):  # of what nothing depends on
                 chance = np.sqrt(inflation * np.maximum(fit.variance(normal) - whole, 1e-6 * whole))
                 sure = np.where(np.abs(moved) > _MOVED * fit.stderr, np.abs(moved) / chance, 0.0)
             k = int(np.argmax(np.nan_to_num(sure)))

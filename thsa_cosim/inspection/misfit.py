@@ -241,20 +241,26 @@ def _in_file(offset: float, unit: str, file_unit: str | None) -> str:
     return f"{own:.4g}  # in {file_unit}, the unit of the file's numbers"
 
 
-def own_delay(time: FloatArray, simulated: FloatArray) -> float:
+def _commanded_by_steps(residual: Residual) -> bool:
+    """Whether an input that is held from sample to sample moves."""
+    return any(float(np.ptp(residual.inputs[n])) > 0.0 for n in residual.held if n in residual.inputs)
+
+
+def own_delay(time: FloatArray, simulated: FloatArray, *, held: bool = False) -> float:
     """Return the longest delay, in s, that the sampling itself makes of a command that changes between two samples.
 
-    A controller changes it at its own samples: where some are lost, or the answer is too fast, nobody knows when.
+    A controller changes it at its own samples: where some are lost, the answer is too fast, or a command that moves is
+    ``held`` from one sample of the recording to the next, nobody knows when.
     """
     steps = np.diff(time)
     usual, mean = float(np.median(steps)), float(np.sum(steps**2) / np.sum(steps))
     hop, whole = float(np.max(np.abs(np.diff(simulated)))), float(np.ptp(simulated))
-    return mean if mean > _UNEVEN * usual or hop > _HOP * whole else _SHORT * usual
+    return mean if held or mean > _UNEVEN * usual or hop > _HOP * whole else _SHORT * usual
 
 
 def _delay_finding(residual: Residual, best: Slip, by: float, share: float) -> Finding | None:
     step = float(np.median(np.diff(residual.time)))
-    if abs(by) < own_delay(residual.time, residual.simulated):
+    if abs(by) < own_delay(residual.time, residual.simulated, held=_commanded_by_steps(residual)):
         return None
     severity: Severity = "warning" if abs(by) < 20.0 * step else "error"
     word = "late" if by > 0.0 else "early"

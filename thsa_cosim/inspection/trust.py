@@ -30,8 +30,9 @@ _MOST_REASONS = 12
 class Residual:
     """What is left of ``channel`` in one recording: simulated less measured over noise, (n,), dimensionless.
 
-    ``inputs``: by name, (n,) at the same samples. ``noise``: 1 σ in ``unit``. For ``misfits`` also ``time`` (n,) s,
-    ``simulated`` (n,) in ``unit``, and ``slopes`` (n, p): how the values follow each parameter, in any scale.
+    ``inputs``: by name, (n,) at the same samples; ``held``: those that stay from one sample to the next. ``noise``: 1 σ
+    in ``unit``. For ``misfits`` also ``time`` (n,) s, ``simulated`` (n,) in ``unit``, and ``slopes`` (n, p): how the
+    values follow each parameter, in any scale.
     """
 
     recording: str
@@ -43,6 +44,7 @@ class Residual:
     time: FloatArray = field(default_factory=lambda: np.empty(0))
     simulated: FloatArray = field(default_factory=lambda: np.empty(0))
     slopes: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    held: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

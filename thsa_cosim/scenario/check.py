@@ -214,6 +214,11 @@ def _black_box(path: Path, spec: DiagnoseOptionsTable, fmu: FmuDescription) -> B
         )
     if spec.blackbox is None:
         return None
+    if spec.known:
+        raise ScenarioError(
+            f"{path}: diagnose.known needs diagnose.model, the Modelica class that gets the effects; an FMU without"
+            " source takes none."
+        )
     for key, name in spec.blackbox.model_dump(exclude_none=True).items():
         readable(fmu, name, f"diagnose.blackbox.{key}")
     return BlackBoxSpec.resolved(spec.blackbox, command=spec.command, load=spec.load)

@@ -344,6 +344,10 @@ class DiagnoseOptionsTable(Table):
     """Folder of its package, relative to the scenario; left out: ``../modelica/THSA``, or the one that is shipped."""
     effects: list[Name] = Field(default_factory=list)
     """Names from the catalogue to try; none: all."""
+    known: dict[Name, dict[Name, float]] = Field(default_factory=dict)
+    """``[diagnose.known."spring:guide"]``: effects that the machine is known to have, with start values by parameter
+    (in the FMU's units; left out: zero, and a shape's first start). They belong to the declared model and are fitted
+    with its parameters."""
     catalogue: Name | None = None
     """A folder with effects of your own, one ``.py`` file each."""
     most: Annotated[int, Field(ge=1, le=10)] = 3

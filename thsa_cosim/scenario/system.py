@@ -38,6 +38,7 @@ def assemble_tables(path: Path, table: ModelTable) -> SystemDescription:
             c.delay,
             {k: float(v) for k, v in c.start.items()},
             c.jitter,
+            c.process,
         )
         for c in table.components
     ]

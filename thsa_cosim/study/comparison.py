@@ -89,6 +89,7 @@ def case_residuals(
                 noise=channel.noise,
                 unit=case.measured.units.get(channel.name, "1"),
                 inputs={name: inputs[name] for name in inputs.names},
+                held=case.inputs.held,
             )
         )
         if own is not None:

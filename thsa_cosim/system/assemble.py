@@ -5,6 +5,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from thsa_cosim.errors import FmuError, did_you_mean
 from thsa_cosim.fmu.archive import sha256_of
@@ -37,6 +38,7 @@ class Part:
     delay: float = 0.0
     start: Mapping[str, float] = field(default_factory=dict)
     jitter: float = 0.0
+    process: Literal["shared", "own"] = "shared"
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,17 @@ def assemble(
         if step is None and execution == "coupled":
             step = fmu.default_experiment.step or _STEP
         components.append(
-            Component(part.name, fmu, source, execution, dict(part.start), step, part.delay, part.jitter)
+            Component(
+                part.name,
+                fmu,
+                source,
+                execution,
+                dict(part.start),
+                step,
+                part.delay,
+                part.jitter,
+                part.process,
+            )
         )
 
     by_name = {component.name: component.fmu for component in components}

@@ -67,6 +67,7 @@ class Element:
     step: float | None = None
     delay: float = 0.0
     jitter: float = 0.0
+    process: Literal["shared", "own"] = "shared"
 
 
 @dataclass(frozen=True)
@@ -321,6 +322,7 @@ def _components(nested: Nested, path: str) -> Iterator[Component]:
                 _step(element),
                 element.delay,
                 element.jitter,
+                element.process,
             )
 
 

@@ -22,8 +22,8 @@ from thsa_cosim.fmu.native import Messages, MessageSink
 from thsa_cosim.fmu.point import Point
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.system.description import DISTURBANCE, SystemDescription
+from thsa_cosim.system.member import crowded, member, named, own_processes
 from thsa_cosim.system.stepped import Stepped
-from thsa_cosim.system.structure import Component
 from thsa_cosim.system.wiring import Port, Wiring
 
 _EVENT_ITERATIONS = 100
@@ -37,20 +37,39 @@ class SystemInstance(Instance):
     types: ClassVar[dict[str, tuple[str, Any]]] = Fmi2Instance.types | Fmi3Instance.types
 
     def __init__(
-        self, folder: Path, description: SystemDescription, kind: str, sink: MessageSink | None = None
+        self,
+        folder: Path,
+        description: SystemDescription,
+        kind: str,
+        sink: MessageSink | None = None,
+        progress: FloatArray | None = None,
     ) -> None:
-        """``folder``: the unpacked archive, in which each component has ``components/<name>``."""
+        """``folder``: the unpacked archive, in which each component has ``components/<name>``; ``progress`` (4,) is
+        told which component is at work.
+        """
         self.description: FmuDescription = description
-        self._system, self._pins = description.system, description.pins
+        self._system, self._pins, self._folder, self._sink = (
+            description.system,
+            description.pins,
+            folder,
+            sink,
+        )
         self.kind, self.messages, self.handle, self.is_dead = kind, Messages(sink), 0, False
+        self._progress = np.zeros(4) if progress is None else progress
+        self._names = list(description.variables)
+        self._given: dict[str, dict[str, float]] = {}
+        self._apart = {*own_processes(self._system), *crowded(self._system, folder)}
+        self._build()
+
+    def _build(self) -> None:
+        """Load every component's FMU and connect them."""
         self.parts: dict[str, Instance] = {}
-        for component in self._system.components:
-            fmu = component.fmu
-            cls = Fmi2Instance if fmu.fmi_version == "2.0" else Fmi3Instance
-            how = "model-exchange" if component.execution == "continuous" else "co-simulation"
-            part = cls(folder / "components" / component.name, fmu, how, sink)
+        for number, component in enumerate(self._system.components, 1):
+            name = component.name
+            place, apart = self._folder / "components" / name, name in self._apart
+            part = member(component, number, place, self._progress, apart=apart, sink=self._sink)
             part.messages = self.messages
-            self.parts[component.name] = part
+            self.parts[name] = part
         self._continuous = [c.name for c in self._system.components if c.execution == "continuous"]
         self._slices = _slices([self.parts[n].description.states for n in self._continuous])
         self._indicators = _slices([self.parts[n].description.event_indicators for n in self._continuous])
@@ -60,7 +79,6 @@ class SystemInstance(Instance):
         order = sorted(self._others, key=lambda c: c.execution == "sampled")
         self._stepped = [Stepped(c, self.parts[c.name], self._wiring, self._driven(c.name)) for c in order]
         self._time = 0.0
-        self._names = list(description.variables)
         self._ports: dict[tuple[str, str], Port] = {}
         self._disturbed = {".".join(pin): k for k, pin in enumerate(self._wiring.targets)}
 
@@ -71,21 +89,46 @@ class SystemInstance(Instance):
 
     # -- life ---------------------------------------------------------------------------------------
     def instantiate(self) -> None:
-        """Instantiate every component and give it its own start values."""
+        """Instantiate every component; one that is refused beside the others gets a separate process."""
+        self._given = {}
+        try:
+            for component in self._system.components:
+                with named(component.name):
+                    self.parts[component.name].instantiate()
+        except SimulationFailure as failure:
+            lonely = [n for n, part in self.parts.items() if part.handle]
+            self.free()
+            name = component.name
+            if failure.status != Status.LOAD_ERROR or name in self._apart or not lonely:
+                raise
+            self._apart.add(name)
+            self._build()
+            self.instantiate()
+            return
+        self.handle = 1
+        self._give_starts()
+
+    def set_start(self, channels: Sequence[Channel], values: FloatArray) -> None:
+        """Set start values through the names of the system, beside those of the system itself.
+
+        Each component keeps its own: a tool that overwrites them at its set-up is given them once more.
+        """
+        self._given = {}
+        for channel in channels:
+            for reference, column in zip(channel.references.tolist(), channel.columns, strict=True):
+                for (name, own), factor, offset in self._pins[self._name(reference)]:
+                    if name != DISTURBANCE:
+                        self._given.setdefault(name, {})[own] = factor * float(values[column]) + offset
+        self._give_starts()
+        self.set_values(channels, values)
+
+    def _give_starts(self) -> None:
         for component in self._system.components:
             part = self.parts[component.name]
-            with _named(component.name):
-                part.instantiate()
-            self._give_start(component)
-        self.handle = 1
-
-    def _give_start(self, component: Component) -> None:
-        if component.start:
-            part = self.parts[component.name]
-            variables = [part.description.variable(n) for n in component.start]
-            values = np.array(list(component.start.values()), dtype=np.float64)
-            with _named(component.name):
-                part.set_values(part.channels(variables), values)
+            starts = {**component.start, **self._given.get(component.name, {})}
+            channels = part.channels([part.description.variable(n) for n in starts])
+            with named(component.name):
+                part.set_start(channels, np.fromiter(starts.values(), float, len(starts)))
 
     def initialize_begin(self, start: float, stop: float, tolerance: float | None) -> None:
         """Bring every component into Initialization Mode."""
@@ -93,7 +136,7 @@ class SystemInstance(Instance):
         for component in self._system.components:
             # A step that begins before the end may go beyond it.
             beyond = 2.0 * (component.step or 0.0)
-            with _named(component.name):
+            with named(component.name):
                 self.parts[component.name].initialize_begin(start, stop + beyond, tolerance)
 
     def initialize_end(self) -> None:
@@ -103,7 +146,7 @@ class SystemInstance(Instance):
         for stepped in self._stepped:
             stepped.write_inputs()
         for name, part in self.parts.items():
-            with _named(name):
+            with named(name):
                 part.initialize_end()
         self._begin_stepped()
 
@@ -122,7 +165,8 @@ class SystemInstance(Instance):
         """Bring every component back to the state after instantiation, with its own start values."""
         for component in self._system.components:
             self.parts[component.name].reset()
-            self._give_start(component)
+        self._given = {}
+        self._give_starts()
 
     def free(self) -> None:
         """Destroy every instance that lives."""
@@ -180,7 +224,7 @@ class SystemInstance(Instance):
         for stepped in self._stepped:
             if stepped.component.name == part and stepped.drive(variable, value):
                 return
-        with _named(part):
+        with named(part):
             self._port(part, variable).write(np.array([value]))
 
     # -- Model Exchange -------------------------------------------------------------------------------
@@ -207,13 +251,13 @@ class SystemInstance(Instance):
     def enter_event_mode(self) -> None:
         """Bring every integrated component into Event Mode."""
         for name in self._continuous:
-            with _named(name):
+            with named(name):
                 self.parts[name].enter_event_mode()
 
     def enter_continuous_time_mode(self) -> None:
         """Bring every integrated component into Continuous-Time Mode."""
         for name in self._continuous:
-            with _named(name):
+            with named(name):
                 self.parts[name].enter_continuous_time_mode()
 
     def event_iteration(self) -> EventInfo:
@@ -228,7 +272,7 @@ class SystemInstance(Instance):
             self.propagate(events=True)
             needs, following = False, None
             for name in self._continuous:
-                with _named(name):
+                with named(name):
                     info = self.parts[name].event_iteration()
                 needs |= info.needs_update
                 terminate |= info.terminate
@@ -252,7 +296,7 @@ class SystemInstance(Instance):
         acted = []
         for stepped in self._stepped:
             self.propagate(events=True)
-            with _named(stepped.component.name):
+            with named(stepped.component.name):
                 if stepped.act(self._time):
                     acted.append(stepped)
             stepped.put(self._time)
@@ -267,7 +311,7 @@ class SystemInstance(Instance):
         for name in self._continuous:
             part = self.parts[name]
             if part.description.capabilities.get("needsCompletedIntegratorStep", True):
-                with _named(name):
+                with named(name):
                     wants, ends = part.completed_integrator_step()
                 event |= wants
                 terminate |= ends
@@ -283,7 +327,7 @@ class SystemInstance(Instance):
         ):
             piece = np.zeros(where.stop - where.start)
             if len(piece):
-                with _named(part):
+                with named(part):
                     self.parts[part].vector(name, piece)
             values[where] = piece
 
@@ -404,16 +448,3 @@ def _continuous_only(instance: SystemInstance, channels: Sequence[Channel]) -> l
 def _slices(sizes: Sequence[int]) -> list[slice]:
     ends = np.cumsum([0, *sizes]).tolist()
     return [slice(a, b) for a, b in pairwise(ends)]
-
-
-class _named:
-    """Put the component's name before what a failure says."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-
-    def __enter__(self) -> None: ...
-
-    def __exit__(self, _kind: Any, error: BaseException | None, _trace: Any) -> None:
-        if isinstance(error, SimulationFailure):
-            raise SimulationFailure(error.status, f"component {self._name}: {error.reason}") from error

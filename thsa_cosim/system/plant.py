@@ -51,7 +51,7 @@ class SystemPlant(Plant):
 
     def _new_instance(self) -> Instance:
         assert isinstance(self.description, SystemDescription)
-        return SystemInstance(self.folder, self.description, self.kind, self._on_message)
+        return SystemInstance(self.folder, self.description, self.kind, self._on_message, self.progress)
 
 
 def open_plant(description: FmuDescription, folder: Path, **options: Any) -> Plant:

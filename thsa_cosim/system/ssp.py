@@ -240,6 +240,7 @@ def _component(
         step=_float(given.get("step")),
         delay=_float(given.get("delay")) or 0.0,
         jitter=_float(given.get("jitter")) or 0.0,
+        process="own" if given.get("process") == "own" else "shared",
     )
 
 

@@ -35,6 +35,8 @@ class Component:
     """Time from a tick until a sampled component's outputs change [s], at most one ``step``."""
     jitter: float = 0.0
     """A sampled component's ticks are late by up to so much [s], uniformly distributed; the same in every run."""
+    process: Literal["shared", "own"] = "shared"
+    """``own``: its FMU runs in a separate process in any case; otherwise where it cannot share one."""
 
 
 @dataclass(frozen=True)

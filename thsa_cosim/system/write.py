@@ -141,6 +141,8 @@ def _component(parent: ET.Element, component: Component) -> None:
         how["delay"] = repr(component.delay)
     if component.jitter:
         how["jitter"] = repr(component.jitter)
+    if component.process == "own":
+        how["process"] = "own"
     _annotate(element, "Execution", how)
 
 

@@ -8,6 +8,12 @@ model Lane "Motor lane: power electronics, velocity and current loop, motor with
   THSA.Interfaces.RealOutput w_s(unit="rad/s") "Speed as the resolver gives it";
   THSA.Interfaces.RotationalFlange flange "Shaft";
   input THSA.Units.Torque tau_f = 0 "Added friction torque at the motor";
+  input THSA.Units.Voltage du = 0 "Voltage that the inverter adds";
+  input THSA.Units.Ratio g_R = 0 "Relative change of the winding resistance";
+  input THSA.Units.Ratio g_psi = 0 "Relative change of the magnets' flux";
+  input THSA.Units.Ratio g_t = 0 "Relative change of the torque constant";
+  input THSA.Units.Ratio g_e = 0 "Relative change of the back-EMF constant";
+  input THSA.Units.Current d_i = 0 "Error of the current sensor, which the current loop uses";
   parameter THSA.Units.Time t_loss(min=-1, max=1e9) = 1e9 "Failure: time from which the electronics give no current";
   parameter THSA.Units.Time t_sensor(min=-1, max=1e9) = 1e9 "Failure: time from which the resolver reads 0";
   parameter THSA.Units.Time t_jam(min=-1, max=1e9) = 1e9 "Failure: time from which the rotor is jammed";
@@ -15,7 +21,8 @@ model Lane "Motor lane: power electronics, velocity and current loop, motor with
   THSA.Controllers.VelocityController velocityController(K_p=0.363, K_i=2.98) "Velocity loop, the law to tune";
   THSA.Controllers.CurrentController currentController "Current loop";
   THSA.Redundancy.MotorBrake brake "Motor brake";
-  THSA.Motor motor(T_w=T_w, tau_f=brake.tau + (if time >= t_jam then T_jam*motor.friction.s else 0) + tau_f) "Motor";
+  THSA.Motor motor(T_w=T_w, du=du, g_R=g_R, g_psi=g_psi, g_t=g_t, g_e=g_e,
+    tau_f=brake.tau + (if time >= t_jam then T_jam*motor.friction.s else 0) + tau_f) "Motor";
   Boolean powered "The bridge drives";
   THSA.Units.Power P_el "Power at the motor's terminals";
   THSA.Units.Power P_loss "All that the lane turns into heat";
@@ -25,8 +32,8 @@ equation
   w_s = if time >= t_sensor then 0 else motor.w_m;
   velocityController.reference = if powered then reference else w_s;
   velocityController.measurement = w_s;
-  currentController.reference = if powered then velocityController.y else motor.i_q;
-  connect(motor.i_q, currentController.measurement);
+  currentController.measurement = motor.i_q + d_i;
+  currentController.reference = if powered then velocityController.y else currentController.measurement;
   motor.u_q = if powered then currentController.y else motor.K_t*motor.w_m;
   connect(T, motor.T);
   connect(motor.friction.s, brake.s);

@@ -120,9 +120,6 @@ def test_a_model_without_slots_and_an_unknown_effect_are_refused_in_one_sentence
 
 def test_slots_are_inherited_less_those_that_are_taken(tmp_path: Path, slots: tuple[Slot, ...]):
     assert find_slots("THSA.ThermalActuator", PACKAGE) == slots
-    redundant = find_slots("THSA.RedundantActuator", PACKAGE)
-    assert [slot.name for slot in redundant] == ["motor", "gearbox", "screw"]
-    assert all(slot in slots for slot in redundant)
     own = tmp_path / "Motor2.mo"
     own.write_text(
         "model Motor2\n"
@@ -134,6 +131,30 @@ def test_slots_are_inherited_less_those_that_are_taken(tmp_path: Path, slots: tu
     )
     base = find_slots("THSA.Examples.BrushlessMotor", PACKAGE)
     assert find_slots(str(own), PACKAGE) == tuple(slot for slot in base if slot.name != "motor")
+
+
+def test_a_place_that_there_is_several_times_takes_what_the_single_one_takes(slots: tuple[Slot, ...]):
+    """Every slot of the single actuator but the shaft's is there for each lane or path, with the same effects."""
+    single = {s.name: s for s in slots}
+    redundant = find_slots("THSA.RedundantActuator", PACKAGE)
+    made = candidates_of(EFFECTS.values(), redundant, {})
+    for slot in redundant:
+        (like,) = [name for name in single if slot.is_a(name)]
+        assert (slot.interface, slot.units) == (single[like].interface, single[like].units)
+        own = candidates_of(EFFECTS.values(), [single[like]], {})
+        assert {c.effect.name for c in made if c.slot == slot} >= {
+            c.effect.name for c in own if c.effect.part != "screw"
+        }
+    assert {s.name for s in redundant} >= {"motorA", "motorB", "contactPrimary", "contactSecondary"}
+    names = {c.name for c in made}
+    assert {"cogging:motorB", "backlash:contactSecondary", "current-sensor-gain:currentSensorA"} <= names
+    assert "velocity-sensor-delay" in names  # there is one such place
+
+
+def test_a_place_is_no_other_one_whose_name_begins_alike():
+    slot = Slot("motorised", "FrictionEffect", {})
+    assert not slot.is_a("motor")
+    assert all(Slot(f"motor{end}", "FrictionEffect", {}).is_a("motor") for end in ("", "A", "Left", "2"))
 
 
 def test_effects_of_ones_own_folder_come_beside_the_known_effects(tmp_path: Path):

@@ -1,11 +1,13 @@
 """The whole decision on a drive in closed form: proposals in; accepted effects, objections, rivals, pruning out."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
 
 from diagnosis.analytic import bench, candidates, unknowns
+from thsa_cosim.diagnosis.choosing import attribution as room
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute, prune
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged
 from thsa_cosim.diagnosis.choosing.gates import out_of_range
@@ -186,6 +188,44 @@ def test_an_effect_that_drives_a_declared_parameter_to_its_end_is_dropped():
     assert found.accepted == ()
     assert any("was dropped: it drives c to the end of its range" in note for note in found.notes)
     assert found.final is found.base
+
+
+def test_of_several_effects_the_last_one_is_dropped_if_they_drive_a_parameter_to_its_end(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """What is left is the model with the one before it, and what that leaves on the held-out recordings."""
+    second, both = "motorEffect.windage.b_q", {**STRIBECK, **WINDAGE}
+    monkeypatch.setattr(room, "out_of_range", lambda fit: "c" if second in fit.unknowns.names else "")
+    found = diagnosed(both, "windage", "stribeck")
+    assert [s.candidate.effect.name for s in found.accepted] == ["stribeck"]
+    assert found.notes == ("windage:motor was dropped: it drives c to the end of its range",)
+    assert found.final is found.accepted[0].fit
+    own = bench(candidates("windage", "stribeck"), both)
+    (held,) = own.residuals(found.final.unknowns, found.final.vector[None, :], "validate")
+    np.testing.assert_allclose(found.final_validate, held)
+    monkeypatch.setattr(room, "out_of_range", lambda fit: "c" if len(fit.vector) > 4 else "")
+    none = diagnosed(both, "windage", "stribeck")
+    assert none.accepted == ()
+    assert none.final is none.base
+    assert len(none.notes) == 2
+
+
+def test_what_cannot_be_simulated_without_the_dropped_effect_is_no_diagnosis(monkeypatch: pytest.MonkeyPatch):
+    offered = candidates("windage")
+    own = bench(offered, WINDAGE)
+    real = own.residuals
+    dropped: list[str] = []
+
+    def ends(fit: Fit) -> str:
+        dropped.append("c")
+        return "c"
+
+    def residuals(*given: Any) -> Any:
+        return [None] if dropped else real(*given)
+
+    monkeypatch.setattr(room, "out_of_range", ends)
+    own.residuals = residuals  # type: ignore[method-assign]
+    assert attribute(own, unknowns(), offered, lambda _: {}, seed=1) is None
 
 
 def accepted_by_hand(true: Mapping[str, float], *names: str) -> tuple:

@@ -14,6 +14,7 @@ from thsa_cosim.diagnosis.choosing.findings import (
     NO_MORE,
     found_effects,
     judged,
+    off_the_drawing,
     order_of,
     undetermined,
     vague,
@@ -349,3 +350,16 @@ def test_the_order_of_a_wave_that_no_fit_changes_is_that_of_its_start():
         "of an unknown wave there is none"
     )
     assert order_of(scored(proposal("a", 90.0, "gearbox")), {}, MACHINE) is None
+
+
+def test_a_declared_parameter_far_from_the_drawing_is_noted_with_both_values():
+    """Spreads of 0.1: 1.4 is four of them away, 0.3 seven; an effect's parameter has no drawing."""
+    members = (
+        Unknown("near", "near", "N", 1.0, 0.1, 0.1, 0.0, 9.0),
+        Unknown("far", "far", "N.m", 1.0, 0.1, 0.1, 0.0, 9.0),
+        Unknown("free", "free", "1", 0.0, np.inf, 0.1, 0.0, 9.0, declared=False),
+    )
+    fit = Fit(
+        Unknowns(members), np.array([1.4, 0.3, 5.0]), np.zeros(4), np.zeros((4, 3)), np.ones(3), 1.0, True
+    )
+    assert off_the_drawing(fit) == ("far: 0.3 N.m is 7 times its spread from the drawing's 1 N.m",)

@@ -197,3 +197,15 @@ def test_a_ripple_over_position_is_found_by_its_wave_number():
     grid = np.arange(1.0, 61.0)
     assert wave_numbers([position], [[residual]], grid)[0] == 24.0
     assert wave_numbers([np.zeros(12000)], [[residual]], grid) == ()
+
+
+def test_candidates_that_do_the_same_gain_by_chance_what_one_does_whatever_their_units():
+    fit = base()
+    one = proposal(fit, 1)
+    twin = SimpleNamespace(response=one.response * 1e-4, is_testable=True)
+    double = SimpleNamespace(
+        response=np.concatenate([one.response, -3.0 * one.response], axis=1), is_testable=True
+    )
+    for offered in ([one, twin], [twin], [double], [double, twin]):
+        gains = largest_gains(fit, offered, seed=4, draws=2000)
+        assert stats.kstest(gains, stats.chi2(1).cdf).pvalue > 1e-3

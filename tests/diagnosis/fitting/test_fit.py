@@ -241,3 +241,20 @@ def test_a_folded_fit_keeps_its_covariance_and_no_row_a_sample():
     assert fit.folded.jacobian.shape == (3, 3)
     assert fit.folded.covariance(2.0) == pytest.approx(fit.covariance(2.0), rel=1e-10)
     assert fit.folded.stderr() == pytest.approx(fit.stderr(), rel=1e-10)
+
+
+def test_a_step_that_falls_short_is_taken_further(monkeypatch: pytest.MonkeyPatch):
+    """A wave whose phase is 2.5 rad off: half a turn away its slope promises a fraction of what a longer step gains."""
+
+    def wave(values: Mapping[str, float]) -> np.ndarray:
+        return np.sin(3.0 * TIME + values["p"])
+
+    start = Unknowns((unknown("p", 2.5, scale=1.0),))
+    monkeypatch.setitem(MEASURED, "fit", np.sin(3.0 * TIME))
+    fit = refine(bench(wave), start, start.start, iterations=1)
+    assert fit is not None
+    assert abs(fit.vector[0]) < 0.5
+    monkeypatch.setattr("thsa_cosim.diagnosis.fitting.fit.FURTHER", ())
+    short = refine(bench(wave), start, start.start, iterations=1)
+    assert short is not None
+    assert 1.5 < short.vector[0] < 2.5

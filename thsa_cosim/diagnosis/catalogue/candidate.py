@@ -33,7 +33,8 @@ class CandidateParameter:
 class Candidate:
     """One effect in one slot: ``parameters`` are those that a fit may change.
 
-    ``all_parameters`` holds besides those that the other variants of the same block use.
+    ``all_parameters`` holds besides those that the other variants of the same block use. ``is_one_of_several``: the
+    model has further slots that take the effect, so that its name says the place.
     """
 
     effect: Effect
@@ -42,6 +43,7 @@ class Candidate:
     number: int
     parameters: tuple[CandidateParameter, ...]
     all_parameters: tuple[CandidateParameter, ...]
+    is_one_of_several: bool = False
 
     @property
     def component(self) -> str:
@@ -55,9 +57,9 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """``effect`` or, where a friction pair is meant, ``effect:place``."""
-        place = self.slot.name
-        return f"{self.effect.name}:{place}" if self.slot.interface == "FrictionEffect" else self.effect.name
+        """``effect`` or, for a friction pair and where there are several such places, ``effect:place``."""
+        placed = self.slot.interface == "FrictionEffect" or self.is_one_of_several
+        return f"{self.effect.name}:{self.slot.name}" if placed else self.effect.name
 
     @property
     def key(self) -> str:
@@ -85,17 +87,20 @@ def candidates_of(
         if effect.part == "screw" and not has_screw(slots):
             continue
         for slot in slots:
-            fitting = [
-                v
-                for v in effect.variants
-                if v.interface == slot.interface and (v.slots is None or slot.name in v.slots)
-            ]
+            fitting = [v for v in effect.variants if _takes(slot, v)]
             resolved = {id(v): _resolve(v, slot, scales.get(slot.name, {})) for v in fitting}
             for number, variant in enumerate(fitting):
                 same = [p for v in fitting if v.block == variant.block for p in resolved[id(v)]]
                 unique = tuple({p.name: p for p in same}.values())
-                found.append(Candidate(effect, variant, slot, number, resolved[id(variant)], unique))
+                several = sum(_takes(s, variant) for s in slots) > 1
+                found.append(Candidate(effect, variant, slot, number, resolved[id(variant)], unique, several))
     return tuple(found)
+
+
+def _takes(slot: Slot, variant: Variant) -> bool:
+    """Whether a way in which an effect acts has its place in ``slot``."""
+    named = variant.slots is None or any(slot.is_a(place) for place in variant.slots)
+    return variant.interface == slot.interface and named
 
 
 def has_screw(slots: Iterable[Slot]) -> bool:

@@ -89,7 +89,8 @@ class Variant:
     """One way in which an effect can act: a Modelica class in the slots of an interface.
 
     ``block`` and ``interface`` are class names within ``THSA.Effects`` and ``THSA.Interfaces`` (or qualified);
-    ``slots`` restricts it to slots of these names (without the ending ``Effect``), None: all of the interface.
+    ``slots`` restricts it to slots of these names (without the ending ``Effect``; ``motor`` takes ``motorA`` as well),
+    None: all of the interface.
     ``beside``: offered only once another variant of the block is in the model, as a further part of the same effect.
     ``instead``: another form, tried in the place where the effect was accepted.
     ``law``: the block's equation, for FMUs without source (`diagnosis.blackbox`); None: not for those.

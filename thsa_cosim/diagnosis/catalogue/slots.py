@@ -1,7 +1,8 @@
 """The effect slots of a model: which places it offers, and the units there.
 
 A slot is a replaceable component at the top level of a Modelica class, own or inherited, named ``<place>Effect`` and
-constrained by one of the partial blocks of ``THSA.Interfaces``.
+constrained by one of the partial blocks of ``THSA.Interfaces``. A model with several places of a kind marks each by a
+capital letter, a word with one, or a number: ``motorAEffect``, ``motorBEffect``.
 """
 
 from collections.abc import Mapping
@@ -58,6 +59,11 @@ class Slot:
     def component(self) -> str:
         """Name of the component in the model."""
         return self.name + "Effect"
+
+    def is_a(self, place: str) -> bool:
+        """Whether this is the ``place`` of an effect, or one of several: ``motor``, ``motorA``, ``motor2``."""
+        rest = self.name.removeprefix(place)
+        return self.name.startswith(place) and (not rest or rest[0].isupper() or rest[0].isdigit())
 
     @property
     def position(self) -> str | None:

@@ -5,20 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.known import known_effects
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round
-from thsa_cosim.diagnosis.choosing.orders import Machine, Order, name_by_order
+from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine, Order, name_by_order
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown
-from thsa_cosim.diagnosis.results import FoundEffect, Judged, Value
+from thsa_cosim.diagnosis.results import FoundEffect, Judged, KnownEffect, Value
 from thsa_cosim.signals import FloatArray
 
 #: An error above this share of its value leaves it open; one above this share of the drawing's is the drawing's.
 CLEAR, NO_MORE = 1.0 / 3.0, 0.95
-#: A machine of which no ratio is known.
-NO_MACHINE = Machine({}, {})
+#: A declared parameter so many spreads from the drawing is a finding of its own: a brake that drags, a weak magnet.
+FAR = 5.0
 #: What would not be seen at this many times its ordinary size cannot be tested.
 HUGE = 10.0
 
@@ -45,6 +46,17 @@ def undetermined(unknown: Unknown, value: float, stderr: float) -> str:
     if unknown.declared and stderr > NO_MORE * unknown.spread:
         return "the recordings say no more of it than the drawing"
     return ""
+
+
+def off_the_drawing(fit: Fit) -> tuple[str, ...]:
+    """Which declared parameters the recordings move by more than `FAR` spreads from the drawing, the farthest first."""
+    apart = np.abs(fit.unknowns.prior(fit.vector))
+    far = [k for k in np.argsort(-apart) if apart[k] > FAR]
+    members = [(fit.unknowns.members[k], float(fit.vector[k]), float(apart[k])) for k in far]
+    return tuple(
+        f"{u.name}: {value:.4g} {u.unit} is {times:.0f} times its spread from the drawing's {u.start:.4g} {u.unit}"
+        for u, value, times in members
+    )
 
 
 def vague(members: Sequence[Scored], values: Mapping[str, Value]) -> dict[str, Value]:
@@ -102,6 +114,18 @@ def found_effects(
     return tuple(effects)
 
 
+def known_values(known: Sequence[DeclaredEffect], fit: Fit, stderr: FloatArray) -> tuple[KnownEffect, ...]:
+    """The effects of the declared model with the values of ``fit``, whose unknowns err by ``stderr`` (n,)."""
+    values = values_of(fit, declared=True, stderr=stderr)
+    found: dict[str, dict[str, Value]] = {}
+    for effect in known:
+        for p in effect.candidate.parameters:
+            given = Value(effect.starts[p.name], p.unit, 0.0)
+            own = replace(values.get(p.variable, given), variable=p.variable, role=p.role)
+            found.setdefault(effect.candidate.name, {})[p.name] = own
+    return tuple(KnownEffect(name, parameters) for name, parameters in found.items())
+
+
 def order_of(scored: Scored, values: Mapping[str, Value], machine: Machine) -> Order | None:
     """The order of a ripple in the machine; None for what does not repeat, or over no shaft's turn."""
     for p in scored.candidate.parameters:
@@ -141,7 +165,7 @@ def _parameters(members: list[Scored], values: Mapping[str, Value]) -> dict[str,
         p.variable: Value(s.proposal.shapes[p.name], p.unit, 0.0)
         for s in members
         for p in s.candidate.parameters
-        if p.fixed
+        if p.fixed or p.name in s.proposal.held
     }
     values = {**values, **given}
     ways = {s.candidate.component + s.candidate.slot.name for s in members}

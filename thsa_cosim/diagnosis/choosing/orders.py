@@ -31,10 +31,15 @@ class Order:
     @property
     def effect(self) -> str:
         """The name that a ripple of this order goes by."""
-        return "cogging" if self.part == "motor" else "screw-ripple"
+        return "cogging" if is_motor(self.part) else "screw-ripple"
 
     def __str__(self) -> str:
         return f"{self.number} per turn of the {self.part}"
+
+
+def is_motor(shaft: str) -> bool:
+    """Whether a shaft is a motor's: ``motor``, or one of several, ``motorA``."""
+    return Slot(shaft, "FrictionEffect", {}).is_a("motor")
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,7 @@ class Machine:
             # a wave that is only as near as its error has to be sharper, or any would be near.
             close = apart * 0.5 * self.travel[slot] < PHASE and max(stderr, 0.0) < ratio / 12.0
             near = apart < 3.0 * stderr and max(stderr, 0.0) < 0.05 * ratio
-            if 1 <= number <= (FAST if shaft == "motor" else SLOW) and (close or near):
+            if 1 <= number <= (FAST if is_motor(shaft) else SLOW) and (close or near):
                 return Order(shaft, number)
         return None
 
@@ -69,6 +74,10 @@ class Machine:
         if slot in self.turns.get(slot, {}):
             return ()
         return tuple(n * ratio for ratio in self.turns.get(slot, {}).values() for n in (1, 2))
+
+
+#: A machine of which no ratio is known.
+NO_MACHINE = Machine({}, {})
 
 
 def machine_of(slots: Sequence[Slot], signals: Mapping[str, Signals]) -> Machine:

@@ -41,6 +41,8 @@ class Proposal:
     amplitudes: FloatArray
     remaining: float
     precision: FloatArray
+    held: frozenset[str] = frozenset()
+    """Names of shapes that are known: orders of the machine."""
 
     @property
     def stderr(self) -> FloatArray:

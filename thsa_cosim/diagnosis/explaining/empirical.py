@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
+from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Variant
 from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, write_extended
 from thsa_cosim.diagnosis.catalogue.slots import find_slots
@@ -67,6 +68,7 @@ class LawSearch:
     spec: DiagnoseSpec
     trials: tuple[Trial, ...]
     declared: Unknowns
+    known: tuple[DeclaredEffect, ...]
     accepted: tuple[Scored, ...]
     after: Identified
     folder: Path
@@ -80,10 +82,13 @@ class LawSearch:
             s for s in find_slots(self.spec.model, self.spec.package) if s.interface == "FrictionEffect"
         )
         simulation = self.scenario.simulation
-        own = [s.candidate for s in self.accepted]
+        own = [*(effect.candidate for effect in self.known), *(s.candidate for s in self.accepted)]
+        shapes = {v: x for effect in self.known for v, x in effect.given.items()} | fixed_shapes(
+            self.accepted
+        )
         name = f"{base.replace('.', '_')}_empirical"
         terms = candidates_of((EMPIRICAL,), slots, {})
-        source = extended_class(name, base, [*own, *terms], fixed_shapes(self.accepted))
+        source = extended_class(name, base, [*own, *terms], shapes)
         file = write_extended(self.folder, name, source)
         fmu = export_fmu(
             str(file),

@@ -90,6 +90,10 @@ class Bench:
             ]
         )
 
+    def level(self, part: Part) -> float:
+        """Root mean square of the `factors` of ``part``: what white noise of the sensors' size would leave."""
+        return float(np.sqrt(np.mean(self.factors(part) ** 2))) if self.weights else 1.0
+
     def of(self, part: Part) -> tuple[Trial, ...]:
         """The recordings that play ``part``."""
         return tuple(t for t in self.trials if t.part == part)

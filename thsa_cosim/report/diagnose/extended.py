@@ -44,7 +44,7 @@ def write_extended_scenario(result: DiagnosisResult, folder: Path) -> Path | Non
         *(_declared(p, result.declared_after.get(p["name"])) for p in asked["parameters"]),
         *_coefficients(result, result.extended_fmu),
     ]
-    values = [v for e in result.effects for v in e.parameters.values()]
+    values = [v for e in (*result.known, *result.effects) for v in e.parameters.values()]
     asked["fixed"] = {**asked.get("fixed", {}), **{v.variable: v.value for v in values if v.role == "shape"}}
     path = folder / EXTENDED
     text = _HEADING.format(path=path, folder=folder) + "\n".join(_tables(asked, ()))
@@ -76,7 +76,7 @@ def _declared(parameter: Mapping[str, Any], found: Value | None) -> dict[str, An
 def _coefficients(result: DiagnosisResult, fmu: Path) -> Iterator[dict[str, Any]]:
     """The effects' coefficients; their shapes (wave numbers, speeds) stay as they were found."""
     variables = read_description(fmu).variables
-    for effect in result.effects:
+    for effect in (*result.known, *result.effects):
         values = {n: v for n, v in effect.parameters.items() if v.role == "coefficient"}
         sizes: dict[str, float] = {}
         for v in values.values():

@@ -41,6 +41,7 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
             }
             for e in result.effects
         ],
+        "known": [{"name": e.name, "parameters": _values(e.parameters)} for e in result.known],
         "before": {**_errors(result.before), "recordings": _errors(result.recordings_before)},
         "after": {**_errors(result.after), "recordings": _errors(result.recordings_after)},
         "unexplained": result.unexplained,

@@ -47,6 +47,7 @@ def print_diagnosis(console: Console, content: Content) -> None:
         console.print(_effects(content))
     console.print(_errors(content))
     for text in (
+        *_known(content),
         *_forces(content),
         *_faults(content),
         *empirical_law(content),
@@ -71,6 +72,19 @@ def _effects(content: Content) -> Table:
             )
             table.add_row(Text(effect["name"]), name, number(value["value"]), error, value["unit"])
     return table
+
+
+def _known(content: Content) -> list[str]:
+    """The effects that the scenario declares, with the last model's values."""
+    return [
+        f"Known effect {e['name']}: "
+        + ", ".join(
+            f"{name} = {number(p['value'])} ± {number(p['stderr'], 2)} {p['unit']}"
+            for name, p in e["parameters"].items()
+        )
+        + "."
+        for e in content.get("known", [])
+    ]
 
 
 def _errors(content: Content) -> Table:

@@ -303,6 +303,18 @@ def inverter_dead_time(random: Random, rig: Rig) -> Draft:
     )
 
 
+def spring(random: Random, rig: Rig) -> Draft:
+    """A cable, a bellows or a seal that pulls the nut back to where it started, or pushes it away."""
+    way = either_way(random)
+    return Draft(
+        "spring",
+        "linear",
+        lambda a: {"spring": 1e5 * way * a},
+        20.0,
+        _signed("spring", "N/m", "stiffness", "c"),
+    )
+
+
 CATALOGUE: Mapping[str, Callable[[Random, Rig], Draft]] = {
     maker.__name__.replace("_", "-"): maker
     for maker in (
@@ -322,5 +334,6 @@ CATALOGUE: Mapping[str, Callable[[Random, Rig], Draft]] = {
         velocity_sensor_gain,
         velocity_sensor_delay,
         inverter_dead_time,
+        spring,
     )
 }

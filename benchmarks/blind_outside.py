@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from blind_effects import Draft, Random, either_way, log_uniform
+from blind_effects import Draft, Random, log_uniform
 from blind_plant import Rig
 
 
@@ -64,12 +64,6 @@ def leaky_integrator(random: Random, rig: Rig) -> Draft:
     return Draft("leaky-integrator", "first order", lambda a: {"leak": 0.02 * a}, 30.0)
 
 
-def spring(random: Random, rig: Rig) -> Draft:
-    """A cable, a bellows or a seal that pulls the nut back to where it started."""
-    way = either_way(random)
-    return Draft("spring", "linear", lambda a: {"spring": 1e5 * way * a}, 20.0)
-
-
 def scale_error(random: Random, rig: Rig) -> Draft:
     """Interpolation error of the position scale, periodic in its pitch."""
     pitch = log_uniform(random, 5e-4, 2e-3)
@@ -91,7 +85,6 @@ OUTSIDE: Mapping[str, Callable[[Random, Rig], Draft]] = {
         dwell_friction,
         vibration,
         leaky_integrator,
-        spring,
         scale_error,
     )
 }

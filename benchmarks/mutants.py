@@ -1,11 +1,12 @@
 """Mutation testing of the decisions: small changes of the code, and which of them its tests notice.
 
-    python benchmarks/mutants.py [--children 2] [--sample N] [PATTERN ...]
+    python benchmarks/mutants.py [--children 2] [--sample N] [--known] [PATTERN ...]
 
 Runs mutmut as `pyproject.toml` says and prints per module how many mutants were noticed, then those that survived.
 Leaves with 1 if less than 90 % are noticed. PATTERN restricts it: "thsa_cosim.diagnosis.choosing.gates*". All take
-hours; ``--sample 25`` tries 25 of every module, drawn by chance, and prints what that says about all of them.
-What is known from a run before, of code and tests that are the same, is kept: without PATTERN or sample a run goes on.
+hours: ``--sample 25`` tries mutants drawn by chance until 25 of every module are known, and the last line says what
+that makes of all of them. What a run before has found out is kept as long as the code is the same; ``--known`` prints
+it and runs nothing.
 """
 
 from __future__ import annotations
@@ -33,21 +34,21 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--children", type=int, default=2, help="tests that run at the same time")
     parser.add_argument(
-        "--sample", type=int, metavar="N", help="try N mutants of every module, drawn by chance"
+        "--sample", type=int, metavar="N", help="try mutants until N of every module are known"
     )
     parser.add_argument("--seed", type=int, default=1, help="of the sample")
+    parser.add_argument("--known", action="store_true", help="print what runs before have found out")
     parser.add_argument("patterns", nargs="*", metavar="PATTERN")
     given = parser.parse_args()
-    chosen = given.patterns
-    if given.sample:
+    run = ("run", "--max-children", str(given.children))
+    if given.sample and not given.known:
         if not states():
-            mutmut("run", "--max-children", str(given.children), FIRST)  # which makes all mutants
-        chosen = sample(
-            [name for name in states() if matches(name, given.patterns)], given.sample, given.seed
-        )
-    mutmut("run", "--max-children", str(given.children), *chosen)
-    known = states()
-    return report(known, sizes=Counter(map(module, known)), tried=chosen if given.sample else None)
+            mutmut(*run, FIRST)  # which makes all mutants
+        if chosen := sample(meant(states(), given.patterns), given.sample, given.seed):
+            mutmut(*run, *chosen)
+    elif not given.known:
+        mutmut(*run, *given.patterns)
+    return report(meant(states(), given.patterns))
 
 
 def mutmut(*arguments: str) -> str:
@@ -76,42 +77,49 @@ def module(name: str) -> str:
     return name.split(".x")[0]
 
 
-def matches(name: str, patterns: list[str]) -> bool:
-    """Whether a mutant is meant; without patterns each is."""
-    return not patterns or any(fnmatch.fnmatch(name, pattern) for pattern in patterns)
+def meant(known: dict[str, str], patterns: list[str]) -> dict[str, str]:
+    """Those of the mutants that a pattern matches; without patterns all."""
+    return {
+        name: state
+        for name, state in known.items()
+        if not patterns or any(fnmatch.fnmatch(name, pattern) for pattern in patterns)
+    }
 
 
-def sample(names: list[str], count: int, seed: int) -> list[str]:
-    """``count`` of every module, or all of a smaller one."""
+def sample(known: dict[str, str], count: int, seed: int) -> list[str]:
+    """As many unknown mutants of every module as make ``count`` that are known, or all of a smaller one."""
     chance = random.Random(seed)
     by_module: dict[str, list[str]] = {}
-    for name in names:
+    for name in known:
         by_module.setdefault(module(name), []).append(name)
-    return [n for own in by_module.values() for n in chance.sample(own, min(count, len(own)))]
+    chosen = []
+    for own in by_module.values():
+        unknown = [name for name in own if known[name] == UNKNOWN]
+        wanted = count - (len(own) - len(unknown))
+        chosen += chance.sample(unknown, min(max(wanted, 0), len(unknown)))
+    return chosen
 
 
-def report(known: dict[str, str], sizes: Counter[str], tried: list[str] | None) -> int:
+def report(known: dict[str, str]) -> int:
     """Print what was noticed per module and what survived; 1 below the goal.
 
-    ``tried``: a sample; then the share of all is each module's share times its size, with its standard error.
+    Where only some mutants of a module were tried, the last line says what share of all is noticed: each module's share
+    by its size, with its standard error.
     """
-    counted = {
-        name: state for name, state in known.items() if state != UNKNOWN and (tried is None or name in tried)
-    }
+    sizes = Counter(map(module, known))
+    counted = {name: state for name, state in known.items() if state != UNKNOWN}
     noticed = Counter(module(name) for name, state in counted.items() if state in NOTICED)
     total = Counter(map(module, counted))
-    for name in sorted(total):
-        _print(name, noticed[name], total[name], sizes[name])
     if not total:
         return 1
-    _print("all", noticed.total(), total.total(), sum(sizes[name] for name in total))
-    share = noticed.total() / total.total()
-    if tried is not None:
-        share, error = estimate(noticed, total, sizes)
-        print(
-            f"of all mutants of these modules {100 * share:.1f} +- {100 * error:.1f} % (one standard error)"
-        )
     print("\n".join(f"{name}: {state}" for name, state in counted.items() if state not in NOTICED))
+    for name in sorted(total):
+        _print(name, noticed[name], total[name], sizes[name])
+    whole = sum(sizes[name] for name in total)
+    _print("all", noticed.total(), total.total(), whole)
+    share, error = estimate(noticed, total, sizes)
+    if total.total() < whole:
+        print(f"of all {whole} mutants {100 * share:.1f} +- {100 * error:.1f} % (one standard error)")
     return 0 if share >= GOAL else 1
 
 

@@ -155,7 +155,7 @@ def test_every_effect_of_the_contract_has_a_form() -> None:
     if not contract.exists():
         pytest.skip(f"{contract} is not on this machine")
     names = contract.read_text().split("## Effect names")[1].split(". More")[0]
-    assert {name.strip().strip("`") for name in names.split(",")} == set(CATALOGUE)
+    assert {name.strip().strip("`") for name in names.split(",")} <= set(CATALOGUE)
     assert len(OUTSIDE) >= 5
 
 

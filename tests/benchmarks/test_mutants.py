@@ -8,34 +8,31 @@ from pathlib import Path
 import pytest
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from mutants import estimate, matches, module, report, sample
-
-
-def said(known: dict[str, str], tried: list[str] | None = None) -> int:
-    return report(known, Counter(map(module, known)), tried)
+from mutants import estimate, meant, module, report, sample
 
 
 def test_report_counts_what_was_noticed_and_lists_what_survived(capsys: pytest.CaptureFixture[str]):
     known = {f"room.gates.x_objection__mutmut_{k}": "killed" for k in range(8)}
-    known |= {"room.score.xǁScoredǁname__mutmut_1": "timeout", "room.score.x_polish__mutmut_2": "not checked"}
-    assert said(known | {"room.score.x_polish__mutmut_3": "survived"}) == 0
-    printed = capsys.readouterr().out
-    assert "room.gates" in printed
-    assert "9 of    10 tried of    11   90.0 %" in printed
-    assert printed.splitlines()[-1] == "room.score.x_polish__mutmut_3: survived"
-    assert said(known | {"room.a.x_b__mutmut_1": "no tests", "room.a.x_b__mutmut_2": "survived"}) == 1
-    assert said({}) == 1
+    known |= {"room.score.xǁScoredǁname__mutmut_1": "timeout", "room.score.x_polish__mutmut_3": "survived"}
+    assert report(known) == 0, "nine of ten are the goal"
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0] == "room.score.x_polish__mutmut_3: survived"
+    assert printed[1].startswith("room.gates ")
+    assert "9 of    10 tried of    10   90.0 %" in printed[-1]
+    assert report(known | {"room.a.x_b__mutmut_1": "no tests"}) == 1
+    assert report(known | {"room.a.x_b__mutmut_1": "segfault"}) == 0
+    assert report({}) == report({"room.a.x_b__mutmut_1": "not checked"}) == 1
 
 
-def test_a_sample_speaks_for_all_with_each_module_by_its_size(capsys: pytest.CaptureFixture[str]):
-    """A small module that is noticed wholly, and a large one of which half is: 100 and 900 mutants."""
+def test_some_of_every_module_speak_for_all_with_each_module_by_its_size(capsys: pytest.CaptureFixture[str]):
+    """100 mutants that are noticed wholly, and 900 of which half are: 50 of each were tried."""
     known = {f"room.a.x_f__mutmut_{k}": "killed" for k in range(100)}
     known |= {f"room.b.x_f__mutmut_{k}": "killed" if k % 2 else "survived" for k in range(900)}
-    tried = [name for name in known if int(name.rpartition("_")[2]) < 50]
-    assert said(known, tried) == 1
+    some = {n: s if int(n.rpartition("_")[2]) < 50 else "not checked" for n, s in known.items()}
+    assert report(some) == 1
     printed = capsys.readouterr().out
     assert "75 of   100 tried of  1000   75.0 %" in printed
-    assert "of all mutants of these modules 55.0 +- 6.2 %" in printed
+    assert "of all 1000 mutants 55.0 +- 6.2 %" in printed.splitlines()[-1]
     assert printed.count("survived") == 25
     share, error = estimate(Counter(a=50, b=25), Counter(a=50, b=50), Counter(a=100, b=900))
     assert share == pytest.approx(0.55)
@@ -43,11 +40,16 @@ def test_a_sample_speaks_for_all_with_each_module_by_its_size(capsys: pytest.Cap
     assert estimate(Counter(a=9), Counter(a=10), Counter(a=10)) == (0.9, 0.0), "all of them is no sample"
 
 
-def test_a_sample_takes_as_many_of_each_module_and_repeats_itself():
-    names = [f"room.a.x_f__mutmut_{k}" for k in range(100)] + [f"room.b.x_f__mutmut_{k}" for k in range(3)]
-    drawn = sample(names, 10, seed=1)
+def test_a_sample_makes_as_many_of_each_module_known_and_repeats_itself():
+    known = {f"room.a.x_f__mutmut_{k}": "not checked" for k in range(100)}
+    known |= {f"room.b.x_f__mutmut_{k}": "not checked" for k in range(3)}
+    drawn = sample(known, 10, seed=1)
     assert Counter(map(module, drawn)) == {"room.a": 10, "room.b": 3}
     assert len(set(drawn)) == 13
-    assert drawn == sample(names, 10, seed=1) != sample(names, 10, seed=2)
-    assert [n for n in names if matches(n, ["room.b*"])] == names[100:]
-    assert all(matches(n, []) for n in names)
+    assert drawn == sample(known, 10, seed=1) != sample(known, 10, seed=2)
+    more = sample(known | dict.fromkeys(drawn, "killed"), 12, seed=1)
+    assert len(more) == 2
+    assert not set(more) & set(drawn)
+    assert sample(known | dict.fromkeys(drawn, "killed"), 10, seed=1) == []
+    assert list(meant(known, ["room.b*"])) == [f"room.b.x_f__mutmut_{k}" for k in range(3)]
+    assert meant(known, []) == known

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from thsa_cosim import __version__
 from thsa_cosim.diagnosis.blackbox.prepare import BlackBox, wrap_black_box
@@ -41,7 +42,14 @@ from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified, identify_model
 from thsa_cosim.diagnosis.fitting.structure import errors, errors_by_recording
-from thsa_cosim.diagnosis.fitting.trials import Trial, spec_of, trials_of, with_fmu, with_wrapper
+from thsa_cosim.diagnosis.fitting.trials import (
+    Trial,
+    note_on_means,
+    spec_of,
+    trials_of,
+    with_fmu,
+    with_wrapper,
+)
 from thsa_cosim.diagnosis.fitting.uncertainty import standard_errors
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, declared_unknowns_of
 from thsa_cosim.diagnosis.results import DiagnosisResult, EmpiricalLaw, StructuredError
@@ -73,7 +81,9 @@ def diagnose(scenario: Scenario, place: Place) -> DiagnosisResult:
     trials = trials_of(scenario)
     unknowns = declared_unknowns(scenario, trials)
     effects = choose(known_effects(spec.catalogue), spec.effects, f"{scenario.path}: diagnose.effects")
-    with Study.open(place, study_identity(scenario), describe(scenario)) as study:
+    # One thread: the matrices are tall and narrow, and the simulations have the other cores.
+    one_thread = threadpool_limits(limits=1, user_api="blas")
+    with one_thread, Study.open(place, study_identity(scenario), describe(scenario)) as study:
         result = _diagnose(scenario, spec, study, trials, unknowns, effects.values())
         study.complete()
     return result
@@ -124,7 +134,15 @@ def _diagnose(
         machine = machine_of(tested.slots, tested.signals_at(at_start))
         scan = wave_number_finder(bench, tested.slots, tested.signals_at, machine)
         found = attribute(
-            bench, unknowns, tested.candidates, scan, start=start, seed=scenario.seed, most=spec.most, say=say
+            bench,
+            unknowns,
+            tested.candidates,
+            scan,
+            start=start,
+            seed=scenario.seed,
+            most=spec.most,
+            machine=machine,
+            say=say,
         )
     if found is None:
         reason = next(iter(bench.failures), "no run succeeded")
@@ -155,7 +173,8 @@ class _Closing:
     def result(self) -> DiagnosisResult:
         """Identify the extended model on its own FMU as the declared one was, and judge both."""
         scenario, found, before = self.scenario, self.found, self._declared()
-        accepted, notes, after = found.accepted, [*self.bench.notes, *found.notes], before
+        accepted, after = found.accepted, before
+        notes = [*self.bench.notes, *note_on_means(self.trials), *found.notes]
         model: Path | None = None
         extended: Path | None = None
         wrapper: Path | None = None

@@ -1,4 +1,4 @@
-"""An instance in a process of its own, for an FMU that cannot share one with the other components of a system.
+"""An instance in a separate process, for an FMU that cannot share one with the other components of a system.
 
 The process lives from ``instantiate`` to ``free``. Its death is a SimulationFailure here; a call that hangs is ended
 with the whole run by whoever watches that. Each call costs some 0.1 ms, and each run the start of a process.
@@ -90,7 +90,7 @@ class ApartInstance(Instance):
     def instantiate(self) -> None:
         """Start the process, and instantiate there."""
         if os.name == "nt":
-            raise MachineError("An FMU in a process of its own needs Linux or macOS.")
+            raise MachineError("An FMU in a separate process needs Linux or macOS.")
         ours, theirs = Pipe()
         paths = json.dumps([str(Path(p).absolute()) for p in sys.path])
         self._process = subprocess.Popen(

@@ -27,7 +27,7 @@ class ComponentTable(Table):
     """Each tick of a sampled component comes up to so much later than due, s (uniformly distributed, the same in
     every run); ``delay`` + ``jitter`` at most one step."""
     process: Literal["shared", "own"] = "shared"
-    """``own``: run this FMU in a process of its own (Linux, macOS), which costs some 0.1 ms a call. That happens anyway
+    """``own``: run this FMU in a separate process (Linux, macOS), which costs some 0.1 ms a call. That happens anyway
     where an FMU allows one instance per process, refuses a second one, or brings libraries that another brings too."""
     start: dict[Name, float | bool] = Field(default_factory=dict)
     """Start values by variable of this FMU, in its units."""

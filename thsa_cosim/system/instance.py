@@ -89,7 +89,7 @@ class SystemInstance(Instance):
 
     # -- life ---------------------------------------------------------------------------------------
     def instantiate(self) -> None:
-        """Instantiate every component; one that is refused beside the others gets a process of its own."""
+        """Instantiate every component; one that is refused beside the others gets a separate process."""
         self._given = {}
         try:
             for component in self._system.components:

@@ -1,4 +1,4 @@
-"""The instance of one component: in this process, or in a process of its own where it cannot share one.
+"""The instance of one component: in this process, or in a separate process where it cannot share one.
 
 Either notes in the run's progress that it is at work, so that whoever finds the process dead or hanging can name it.
 """

@@ -36,7 +36,7 @@ class Component:
     jitter: float = 0.0
     """A sampled component's ticks are late by up to so much [s], uniformly distributed; the same in every run."""
     process: Literal["shared", "own"] = "shared"
-    """``own``: its FMU runs in a process of its own in any case; otherwise where it cannot share one."""
+    """``own``: its FMU runs in a separate process in any case; otherwise where it cannot share one."""
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,22 @@ block SensorDelay "Sensor with a transport delay"
   Real q_2(start=0, fixed=true) "Its change over the delay, first order";
   Real q_3(start=0, fixed=true) "Its change over the delay, second order";
   Real q_4(start=0, fixed=true) "Its change over the delay, third order";
+  Real q_5(start=0, fixed=true) "Its change over the delay, fourth order";
+  Real q_6(start=0, fixed=true) "Its change over the delay, fifth order";
+  Real q_7(start=0, fixed=true) "Its change over the delay, sixth order";
+  Real q_8(start=0, fixed=true) "Its change over the delay, seventh order";
 equation
   der(q_1) = q_2/tau;
   der(q_2) = q_3/tau;
   der(q_3) = q_4/tau;
-  der(q_4) = (1680*(u - q_1) - 840*q_2 - 180*q_3 - 20*q_4)/tau;
-  d = -q_2 - q_4/42;
-  annotation(Documentation(info="<html><p>Pad&eacute; approximation of order (4, 4), exp(&minus;p) &asymp; N(&minus;p)/N(p) with
-N(p) = 1680 + 840 p + 180 p<sup>2</sup> + 20 p<sup>3</sup> + p<sup>4</sup>, p = s tau: up to p = 3i its phase errs by
-less than 0.001.</p></html>"));
+  der(q_4) = q_5/tau;
+  der(q_5) = q_6/tau;
+  der(q_6) = q_7/tau;
+  der(q_7) = q_8/tau;
+  der(q_8) = (518918400*(u - q_1) - 259459200*q_2 - 60540480*q_3 - 8648640*q_4 - 831600*q_5 - 55440*q_6
+    - 2520*q_7 - 72*q_8)/tau;
+  d = -q_2 - q_4/30 - q_6/4680 - q_8/3603600;
+  annotation(Documentation(info="<html><p>Pad&eacute; approximation of order (8, 8), exp(&minus;p) &asymp; N(&minus;p)/N(p) with
+N(p) = 518918400 + 259459200 p + 60540480 p<sup>2</sup> + 8648640 p<sup>3</sup> + 831600 p<sup>4</sup> + 55440 p<sup>5</sup>
++ 2520 p<sup>6</sup> + 72 p<sup>7</sup> + p<sup>8</sup>, p = s tau: up to p = 8i its phase errs by less than 0.001.</p></html>"));
 end SensorDelay;

@@ -182,6 +182,51 @@ def test_it_starts_from_the_share_of_the_promise_that_serves_best(monkeypatch: p
         assert started.pop() == pytest.approx(start, rel=1e-6)
 
 
+def test_the_best_start_s_residuals_are_kept_and_only_the_new_column_is_taken(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """The promise is added to what the effect's coefficient is, in full, in three tenths and in one."""
+    candidate = candidates("windage")[0]
+    (variable,) = (p.variable for p in candidate.coefficients)
+    residuals = [np.full(SAMPLES, 3.0), np.full(SAMPLES, 2.0), None]
+    tried: list[np.ndarray] = []
+
+    def simulated(unknowns: Unknowns, vectors: np.ndarray, part: str) -> Any:
+        tried.extend(vectors)
+        return residuals
+
+    bench: Any = SimpleNamespace(residuals=simulated)
+    asked: dict[str, Any] = {}
+
+    def columns(own: Any, unknowns: Any, vector: Any, centre: Any, which: Any, steps: Any) -> Any:
+        asked["columns"] = (own, vector.tolist(), centre, which, steps.tolist())
+        return np.full((SAMPLES, len(which)), 7.0), np.full(len(steps), 0.5)
+
+    monkeypatch.setattr(room, "columns", columns)
+    monkeypatch.setattr(room, "refine", lambda *given, **more: asked.update(given=given, more=more))
+    current = fit(2.0, 9.0, 900.0)
+    assert score(bench, current, HELD, proposed(2e-3), iterations=5) is None
+    (coefficient,) = candidate.coefficients
+    starts = [coefficient.neutral + share * 2e-3 for share in (1.0, 0.3, 0.1)]
+    assert [v[2] for v in tried] == pytest.approx(starts)
+    assert all(v[:2].tolist() == [2.0, 4.0] for v in tried)
+    assert asked["columns"] == (bench, tried[1].tolist(), residuals[1], [2], [0.1, 0.2, 1e-2])
+    own, unknowns, vector = asked["given"]
+    assert (own, unknowns.names, vector.tolist()) == (bench, ("p", "a", variable), tried[1].tolist())
+    more = asked["more"]
+    assert more["residual"] is residuals[1]
+    np.testing.assert_array_equal(
+        more["jacobian"], np.column_stack([current.jacobian, np.full(SAMPLES, 7.0)])
+    )
+    assert more["steps"].tolist() == [0.5] * 3
+    assert (more["fresh"], more["iterations"], more["enough"]) == ([2], 5, 3.0)
+    with_it = replace(MEMBERS[1], name=variable, variable=variable)
+    again = replace(current, unknowns=Unknowns((MEMBERS[0], with_it)))
+    tried.clear()
+    assert score(bench, again, HELD, proposed(2e-3)) is None
+    assert [v[1] for v in tried] == pytest.approx([4.002, 4.0006, 4.0002]), "from where it is"
+
+
 def test_what_cannot_be_simulated_has_no_score():
     own, declared = bench(candidates("windage"), WINDAGE), unknowns()
     base = refine(own, declared, declared.start, iterations=10)

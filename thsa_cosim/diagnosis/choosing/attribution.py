@@ -12,6 +12,8 @@ from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
 from thsa_cosim.diagnosis.choosing.forms import best_form
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, SMALLEST_STRUCTURE, out_of_range
+from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine
+from thsa_cosim.diagnosis.choosing.ripples import freed, on_orders
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
 from thsa_cosim.diagnosis.choosing.selection import Say, Selection
@@ -54,6 +56,15 @@ class Round:
         whole = {id(s) for s in (self.accepted, *self.rivals, *self.forms)}
         return replace(self, scored=tuple(s if id(s) in whole else s.folded for s in self.scored))
 
+    def with_accepted(self, choice: Scored) -> "Round":
+        """The same with ``choice`` in place of the accepted one."""
+        old = self.accepted
+        if old is None or old.proposal is choice.proposal:
+            return self
+        proposals = tuple(choice.proposal if p is old.proposal else p for p in self.proposals)
+        scored = tuple(choice if s.proposal is old.proposal else s for s in self.scored)
+        return replace(self, proposals=proposals, scored=scored, accepted=choice)
+
     def probability(self, gain: float) -> float:
         """Probability that chance makes at least ``gain``."""
         return probability(gain, self.gains)
@@ -86,9 +97,13 @@ def attribute(
     start: FloatArray | None = None,
     seed: int,
     most: int = 3,
+    machine: Machine = NO_MACHINE,
     say: Say = lambda _: None,
 ) -> Attribution | None:
-    """Find the effects, the declared parameters from ``start`` (default: the drawing); None if that does not run."""
+    """Find the effects, the declared parameters from ``start`` (default: the drawing); None if that does not run.
+
+    ``machine``: whose orders the ripples keep to.
+    """
     say("fitting the declared model")
     base = refine(bench, unknowns, unknowns.start if start is None else start, iterations=10)
     if base is None:
@@ -114,7 +129,13 @@ def attribute(
             left = [c for c in free if not _is_known(c, current)]
             rounds.append(
                 _round(
-                    selection, left, scan(current), seed + len(rounds), accepted, offered is candidates
+                    selection,
+                    left,
+                    scan(current),
+                    seed + len(rounds),
+                    accepted,
+                    offered is candidates,
+                    machine,
                 ).folded
             )
             if len(rounds) > 1:  # which effects are alike is told by the responses of the first
@@ -122,23 +143,21 @@ def attribute(
             choice = rounds[-1].accepted
             if choice is None:
                 break
-            accepted.append(choice)
-            current, reweighed = weights.weigh(choice.fit)
+            fit, reweighed = weights.weigh(choice.fit)
             if reweighed is None:
                 return None
-            current_held = reweighed
+            choice, fit, current_held = freed(bench, weights, choice, (fit, reweighed), say)
+            rounds[-1] = rounds[-1].with_accepted(choice)
+            accepted.append(choice)
+            current = fit
             offered = further_parts(choice.candidate, candidates)
         if offered is candidates:
             break
     accepted, current, current_held, notes = prune(bench, unknowns, weights, accepted, current, current_held)
-    while accepted and (name := out_of_range(current)):
-        notes.append(f"{accepted[-1].candidate.name} was dropped: it drives {name} to the end of its range")
-        accepted = accepted[:-1]
-        current = accepted[-1].fit if accepted else base
-        fallen = bench.residuals(current.unknowns, current.vector[None, :], "validate")[0]
-        if fallen is None:
-            return None
-        current_held = fallen
+    kept = _within_range(bench, accepted, base, current, current_held)
+    if kept is None:
+        return None
+    accepted, current, current_held, ended = kept
     return Attribution(
         base,
         base_cost,
@@ -147,8 +166,24 @@ def attribute(
         current,
         weights.plain(weights.base_held, "validate"),
         weights.plain(current_held, "validate"),
-        tuple(notes),
+        (*notes, *ended),
     )
+
+
+def _within_range(
+    bench: Bench, accepted: list[Scored], base: Fit, current: Fit, held: FloatArray
+) -> tuple[list[Scored], Fit, FloatArray, list[str]] | None:
+    """Drop the last effect as long as a declared parameter ends at its range; None if what is left does not run."""
+    notes: list[str] = []
+    while accepted and (name := out_of_range(current)):
+        notes.append(f"{accepted[-1].candidate.name} was dropped: it drives {name} to the end of its range")
+        accepted = accepted[:-1]
+        current = accepted[-1].fit if accepted else base
+        fallen = bench.residuals(current.unknowns, current.vector[None, :], "validate")[0]
+        if fallen is None:
+            return None
+        held = fallen
+    return accepted, current, held, notes
 
 
 def _is_known(candidate: Candidate, fit: Fit) -> bool:
@@ -181,9 +216,12 @@ def _round(
     seed: int,
     accepted: Sequence[Scored],
     whole: bool,
+    machine: Machine = NO_MACHINE,
 ) -> Round:
     """Screen what is ``offered`` (``whole``: all effects, else parts of the last one), refine the best, choose one."""
-    proposals = screen(selection.bench, selection.current, offered, waves)
+    proposals = on_orders(
+        screen(selection.bench, selection.current, offered, waves), machine, selection.current
+    )
     gains = largest_gains(selection.current, proposals, seed)
     limit = threshold(gains)
     scored = selection.refined(proposals, limit)

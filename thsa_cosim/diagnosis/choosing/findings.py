@@ -8,7 +8,7 @@ import numpy as np
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.known import known_effects
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round
-from thsa_cosim.diagnosis.choosing.orders import Machine, Order, name_by_order
+from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine, Order, name_by_order
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -20,8 +20,6 @@ from thsa_cosim.signals import FloatArray
 CLEAR, NO_MORE = 1.0 / 3.0, 0.95
 #: A declared parameter so many spreads from the drawing is a finding of its own: a brake that drags, a weak magnet.
 FAR = 5.0
-#: A machine of which no ratio is known.
-NO_MACHINE = Machine({}, {})
 #: What would not be seen at this many times its ordinary size cannot be tested.
 HUGE = 10.0
 
@@ -167,7 +165,7 @@ def _parameters(members: list[Scored], values: Mapping[str, Value]) -> dict[str,
         p.variable: Value(s.proposal.shapes[p.name], p.unit, 0.0)
         for s in members
         for p in s.candidate.parameters
-        if p.fixed
+        if p.fixed or p.name in s.proposal.held
     }
     values = {**values, **given}
     ways = {s.candidate.component + s.candidate.slot.name for s in members}

@@ -76,6 +76,10 @@ class Machine:
         return tuple(n * ratio for ratio in self.turns.get(slot, {}).values() for n in (1, 2))
 
 
+#: A machine of which no ratio is known.
+NO_MACHINE = Machine({}, {})
+
+
 def machine_of(slots: Sequence[Slot], signals: Mapping[str, Signals]) -> Machine:
     """The ratios between the slots with a position, from every simulated recording; shafts are friction slots."""
     placed = [s for s in slots if s.position is not None]

@@ -48,7 +48,7 @@ def score(
     bench: Bench, current: Fit, held: FloatArray, proposal: Proposal, iterations: int = 2
 ) -> Scored | None:
     """Fit a proposal's parameters beside the current ones, whose Jacobian is kept, and score it; None if it fails."""
-    own = unknowns_of(proposal.candidate, proposal.shapes)
+    own = unknowns_of(proposal.candidate, proposal.shapes, proposal.held)
     unknowns = current.unknowns.with_members([u for u in own if u.name not in current.unknowns.names])
     members = unknowns.names
     new = [k for k in range(len(members)) if k >= len(current.unknowns.members)]
@@ -142,7 +142,7 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scor
 
 def extended_unknowns(declared: Unknowns, accepted: Sequence[Scored]) -> Unknowns:
     """The declared parameters and those of the accepted effects, the latter from their own starts."""
-    members = [u for s in accepted for u in unknowns_of(s.candidate, s.proposal.shapes)]
+    members = [u for s in accepted for u in unknowns_of(s.candidate, s.proposal.shapes, s.proposal.held)]
     return declared.with_members(list({u.name: u for u in members}.values()))
 
 

@@ -18,6 +18,9 @@ from thsa_cosim.signals import FloatArray
 #: their own norm: far from the optimum small steps see the solver's events more than the slope.
 RESPONSE, SHARE = 60.0, 0.1
 SMALLEST, LARGEST = 1e-7, 0.3
+#: A step that gains this many times what it promised is tried at multiples. Where parts stick and slip, differences
+#: see events that move, and make the outputs more sensitive than they are over a longer way: steps stop short.
+UNDERRATED, FURTHER = 1.25, (2.0, 4.0, 8.0)
 #: Information (of unknowns each scaled to 1) below which a combination of them is not determined at all.
 DETERMINED = 1e-11
 
@@ -109,13 +112,18 @@ def columns(
 ) -> tuple[FloatArray, FloatArray]:
     """Jacobian columns (N, len(which)) per scale by one-sided differences, and the steps that serve next time.
 
-    A column whose response was far from ``response`` (default: RESPONSE, or SHARE of the residuals' norm) is taken
-    again with a better step; one that cannot be simulated is zero.
+    A column whose response was far from ``response`` (default: RESPONSE as weighed, or SHARE of the residuals' norm) is
+    taken again with a better step; one that cannot be simulated is zero.
     """
-    aim = max(RESPONSE, SHARE * float(np.linalg.norm(centre))) if response is None else response
+    aim = _response(bench, centre) if response is None else response
     settings = DifferenceSettings(aim, 0.0, smallest=SMALLEST, largest=LARGEST, repeats=2)
     asked = difference_columns(vector, centre, steps, unknowns.box, settings, which)
     return answer(asked, lambda vectors: bench.residuals(unknowns, vectors, "fit"))
+
+
+def _response(bench: Bench, residual: FloatArray) -> float:
+    """By how much a difference step is to move the residuals, as they are weighed."""
+    return max(RESPONSE * bench.level("fit"), SHARE * float(np.linalg.norm(residual)))
 
 
 def refine(
@@ -158,7 +166,7 @@ def refine(
                 break
             if response is not None:
                 break
-            response, stale = 5.0 * max(RESPONSE, SHARE * float(np.linalg.norm(residual))), True
+            response, stale = 5.0 * _response(bench, residual), True
             continue
         gained = cost - better.cost
         vector, residual, cost = better.vector, better.residual, better.cost
@@ -189,9 +197,24 @@ def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, 
         residual = found[best]
         if costs[best] < state.cost and residual is not None:
             damping = max(1e-9, dampings[best] * (0.1 if best == 0 else 1.0))
-            return replace(state, vector=trials[best], residual=residual, cost=costs[best]), promised, damping
+            better = replace(state, vector=trials[best], residual=residual, cost=costs[best])
+            if state.cost - better.cost > UNDERRATED * promised:
+                better = _further(bench, state, better)
+            return better, promised, damping
         damping = dampings[-1] * 100.0
     return None, promised, damping
+
+
+def _further(bench: Bench, state: Fit, better: Fit) -> Fit:
+    """The best of ``better`` and the multiples of its step from ``state``, as far as they go on lowering the cost."""
+    unknowns, step = state.unknowns, better.vector - state.vector
+    for far in FURTHER:
+        vector = unknowns.clip(state.vector + far * step)
+        residual = bench.residuals(unknowns, vector[None, :], "fit")[0]
+        if residual is None or (cost := cost_of(unknowns, vector, residual)) >= better.cost:
+            break
+        better = replace(state, vector=vector, residual=residual, cost=cost)
+    return better
 
 
 def _bounded(state: Fit, curvature: FloatArray, gradient: FloatArray) -> FloatArray:

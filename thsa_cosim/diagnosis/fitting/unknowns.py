@@ -1,6 +1,6 @@
 """The unknowns of a fit: declared parameters (with what the drawing says of them) and an effect's parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -96,6 +96,10 @@ class Unknowns:
         return dict(zip(self.names, vector.tolist(), strict=True))
 
 
+#: Relative spread of a shape that is known: an integer order of a machine.
+EXACT = 1e-6
+
+
 def declared_unknowns_of(effects: Sequence[DeclaredEffect]) -> tuple[Unknown, ...]:
     """The parameters of known effects as declared unknowns, of which only the start is known; each variable once."""
     found = {
@@ -106,8 +110,13 @@ def declared_unknowns_of(effects: Sequence[DeclaredEffect]) -> tuple[Unknown, ..
     return tuple(found.values())
 
 
-def unknowns_of(candidate: Candidate, shapes: Mapping[str, float]) -> tuple[Unknown, ...]:
-    """The candidate's parameters as unknowns: coefficients at neutral, shapes at the given starts."""
+def unknowns_of(
+    candidate: Candidate, shapes: Mapping[str, float], held: Collection[str] = ()
+) -> tuple[Unknown, ...]:
+    """The candidate's parameters as unknowns: coefficients at neutral, shapes at the given starts.
+
+    ``held``: names of shapes that are known there.
+    """
     made = []
     for p in candidate.parameters:
         shape = p.role == "shape"
@@ -120,7 +129,7 @@ def unknowns_of(candidate: Candidate, shapes: Mapping[str, float]) -> tuple[Unkn
                 variable=p.variable,
                 unit=p.unit,
                 start=start,
-                spread=np.inf,
+                spread=EXACT * abs(start) if shape and p.name in held else np.inf,
                 scale=0.3 * (abs(start) or abs(p.typical)) if shape else p.typical,
                 lower=p.lower,
                 upper=p.upper,

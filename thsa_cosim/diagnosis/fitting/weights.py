@@ -34,7 +34,7 @@ class ChannelWeights:
             bench.weights = after
             if plain.size:
                 self.base_held = plain * bench.factors("validate")
-            fit = refine(bench, fit.unknowns, fit.vector, steps=fit.steps, iterations=4) or fit
+            fit = refine(bench, fit.unknowns, fit.vector, steps=fit.steps) or fit
         return fit, bench.residuals(fit.unknowns, fit.vector[None, :], "validate")[0]
 
     def plain(self, residual: FloatArray, part: Part) -> FloatArray:

@@ -10,8 +10,9 @@ from fmu_sources import build
 from tests.fmu.test_plant import lag
 from thsa_cosim.batch import Experiment, Job, LocalRunner
 from thsa_cosim.batch.handling import largest_change, try_input_handling
+from thsa_cosim.batch.own_step import moves_within, own_step
 from thsa_cosim.errors import ParameterError
-from thsa_cosim.fmu import Plant
+from thsa_cosim.fmu import Plant, read_description
 from thsa_cosim.scenario.handling import settle_handling
 from thsa_cosim.scenario.model import SimulationTable
 from thsa_cosim.signals import Signals
@@ -107,6 +108,18 @@ def test_an_fmu_that_steps_by_itself_is_compared_with_no_shorter_step() -> None:
     plain = try_input_handling(Experiment("plain", build.habits2(), wave, ("y",), coarse))
     assert plain.best is not None
     assert plain.best.mode == "mean"
+
+
+def test_inputs_that_are_held_are_no_step_of_the_fmus_own() -> None:
+    fmu = read_description(build.habits2())
+    assert moves_within(fmu, None)
+    assert moves_within(fmu, Signals(TIME, {"u": TIME}))
+    assert not moves_within(fmu, Signals(TIME, {"u": TIME}, {}, frozenset({"u"})))
+    stairs = np.repeat(np.arange(20.0), 4)
+    time = np.arange(80.0)
+    assert own_step(time, {"a": stairs}) == 4.0
+    assert own_step(time, {"a": stairs, "b": time}) is None
+    assert own_step(time, {"a": 0.0 * time}) is None
 
 
 @pytest.mark.parametrize("late", [-3, -1, 1, 3])

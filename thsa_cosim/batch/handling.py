@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.local import LocalRunner
-from thsa_cosim.batch.own_step import own_step
+from thsa_cosim.batch.own_step import moves_within, own_step
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.fmu.inputs import input_modes, input_variables, is_linear
 from thsa_cosim.fmu.plant import Kind
@@ -135,7 +135,7 @@ def try_input_handling(experiment: Experiment, *, deadline_s: float | None = 60.
                 return HandlingTrial("", (), False, reason)
             step = float(np.median(np.diff(experiment.time)))
             own = own_step(outcome.signals.time, outcome.signals.values)
-            if own is not None and own > _OWN * step:
+            if own is not None and own > _OWN * step and moves_within(description, experiment.inputs):
                 return HandlingTrial("", (), False, _by_itself(own, step))
             reference = {n: v[::8] for n, v in outcome.signals.values.items()}
             source = "an eighth of the step"

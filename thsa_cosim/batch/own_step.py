@@ -8,16 +8,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from thsa_cosim.signals import FloatArray
+from thsa_cosim.fmu import FmuDescription
+from thsa_cosim.fmu.inputs import input_variables, is_linear
+from thsa_cosim.signals import FloatArray, Signals
 
 _FEWEST = 10
 """Changes of an output below which it tells nothing."""
 
 
 def own_step(time: FloatArray, values: Mapping[str, FloatArray]) -> float | None:
-    """Return the step [s] at which most outputs change in a run with communication points ``time`` (n,) s.
+    """Return the step [s] at which outputs change in a run with communication points ``time`` (n,) s.
 
-    None if they change at every communication point, or hardly ever.
+    None if one of them changes at every communication point, or all hardly ever. Where inputs are held from sample to
+    sample, that may be theirs: then this tells nothing (``moves_within``).
     """
     spacings = []
     for signal in values.values():
@@ -26,5 +29,12 @@ def own_step(time: FloatArray, values: Mapping[str, FloatArray]) -> float | None
             spacings.append(float(np.median(np.diff(changes))))
     if not spacings:
         return None
-    typical = float(np.median(spacings))
-    return typical * float(np.median(np.diff(time))) if typical >= 2.0 else None
+    fewest = min(spacings)
+    return fewest * float(np.median(np.diff(time))) if fewest >= 2.0 else None
+
+
+def moves_within(description: FmuDescription, inputs: Signals | None) -> bool:
+    """Whether inputs make an FMU move between their samples: there are none, or one runs linearly."""
+    if inputs is None:
+        return True
+    return any(is_linear(inputs, variable) for variable in input_variables(description, inputs))

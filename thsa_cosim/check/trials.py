@@ -6,6 +6,7 @@ import numpy as np
 
 from thsa_cosim.batch import Job, Outcome
 from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined
+from thsa_cosim.batch.own_step import moves_within
 from thsa_cosim.check import coupling, numerics
 from thsa_cosim.check.bench import Bench
 from thsa_cosim.check.budget import LONGEST_RUN, Budget
@@ -205,7 +206,7 @@ class Trials(Bench):
             return
         step = float(self._time[1] - self._time[0])
         fixed = not self._description.capabilities.get("canHandleVariableCommunicationStepSize")
-        judged = numerics.judge_step(self._first, halved, step, fixed)
+        judged = numerics.judge_step(self._first, halved, step, fixed, self._moves_within(self._inputs))
         self._halves = halved.ok
         if judged[0] is not Verdict.OK and self._may_be_cut():
             self._take(name, self._declared_step(step, fixed))
@@ -219,6 +220,9 @@ class Trials(Bench):
             change = judged[2].get("change", 0.0)
             self._take("longer step", numerics.judge_longer_step(self._first, doubled, step, change))
 
+    def _moves_within(self, inputs: Signals | None) -> bool:
+        return moves_within(self._description, inputs)
+
     def _declared_step(self, coarse: float, fixed: bool) -> numerics.Judged:
         """Halve the step that the FMU declares, over the begin of the experiment."""
         time = self._given.communication_points(self._description, cut=True)
@@ -229,7 +233,7 @@ class Trials(Bench):
         if whole.signals is None:
             text = f"{coarse:g} s is too long, and its own {step:g} s fails: {whole.status}: {whole.reason}"
             return Verdict.FAILED, text, {}
-        judged = numerics.judge_step(whole.signals, halved, step, fixed)
+        judged = numerics.judge_step(whole.signals, halved, step, fixed, self._moves_within(inputs))
         if judged[0] is Verdict.FAILED:
             shorter = [(step / 2, halved), *self._shorter_runs(step, time, inputs)]
             judged = numerics.judge_shorter_steps(judged, shorter)

@@ -12,7 +12,7 @@ import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Outcome
 from thsa_cosim.batch.handling import refined
-from thsa_cosim.batch.own_step import own_step
+from thsa_cosim.batch.own_step import moves_within, own_step
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.fmu.inputs import is_ours
 from thsa_cosim.fmu.plant import VARIABLE_STEP
@@ -121,7 +121,8 @@ def _halved(
         return None
     fine = replace(plain, name=f"{plain.name} at half the step", time=refined(plain.time, 2))
     outcome = _run(spec, [plain, fine], values)
-    if outcome.signals is not None and own_step(outcome.signals.time, outcome.signals.values) is not None:
+    fine_run, within = outcome.signals, moves_within(fmu, plain.inputs)
+    if fine_run is not None and within and own_step(fine_run.time, fine_run.values) is not None:
         return None  # shorter steps than its own tell nothing
     return outcome, 2, "lower simulation.step"
 

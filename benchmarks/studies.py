@@ -2,25 +2,31 @@
 
     python benchmarks/studies.py [SCENARIO ...] [--script-points 8] [--output DIR]
 
-Each scenario runs from the import to the page, in a process of its own with one worker, as its command does. Printed
-per study, in CPU seconds: all of it; import; the parent (search, linear algebra, journal); workers; the report
-(tables, pictures, page); export; and the bare FMU: as many simulations as the study had, each as long as one
-takes alone in a compiled process. ``total/FMU`` is the first over the last; ``search/FMU`` leaves out import, report,
-and what it takes to start a Python with NumPy for the worker. Of motor, screw and gearbox,
-`script_least_squares.py` then identifies the first ``--script-points`` temperatures from the same arrays;
-``script/ours`` compares CPU seconds per temperature, ours with everything included, and ``cost`` says by how
-much the script's final cost lies above ours. Of tunings with one set of gains, `script_tuning.py` searches until it
-has our final cost. EMPS needs DATA_EMPS.mat in ``../shared/emps``.
+Each shipped scenario runs from the import to the page, in a process of its own with one worker, as its command
+does, with the package's bytecode compiled beforehand, as an installation has it. Printed per study, in CPU seconds:
+all of it; import; the parent (search, linear algebra, journal); workers; the report (tables, pictures, page);
+export; and the bare FMU: as many simulations as the study had, each as long as one takes alone in a compiled
+process (of a diagnosis: of the declared model; the superset takes longer). ``total/FMU`` is the first over the
+last; ``search/FMU`` leaves out import, report, and what it takes to start a Python with NumPy for the worker. The
+first line is the floor: a Python that imports what any study needs, and one with NumPy alone. Of motor, screw and
+gearbox, `script_least_squares.py` then identifies the first ``--script-points`` temperatures from the same arrays;
+``script/ours`` compares CPU seconds per temperature, ours with everything included, and ``cost`` says by how much
+the script's final cost lies above ours. Of tunings with one set of gains, `script_tuning.py` searches until it has
+our final cost. EMPS needs DATA_EMPS.mat in ``../shared/emps``. A scenario without recordings, or whose command
+refuses it, is named with the reason.
 """
 
 import argparse
+import compileall
 import json
+import os
 import pickle
 import resource
 import subprocess
 import sys
 import tempfile
 import time
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -30,23 +36,13 @@ HERE = Path(__file__).resolve().parent
 sys.path[:] = [entry for entry in sys.path if Path(entry or ".").resolve() != HERE]
 
 SCENARIOS = HERE.parent / "scenarios"
-#: Command of every shipped scenario that runs on shipped recordings.
-COMMANDS = {
-    "motor": "identify",
-    "screw": "identify",
-    "gearbox": "identify",
-    "table4": "tune",
-    "driven": "diagnose",
-    "actuator": "identify",
-    "feedforward": "tune",
-    "schedule": "tune",
-    "system": "tune",
-    "system_sampled": "tune",
-    "emps": "identify",
-}
+#: The quick ones first.
+FIRST = ("motor", "screw", "gearbox", "table4", "driven")
+SHIPPED = (*FIRST, *sorted({path.stem for path in SCENARIOS.glob("*.toml")} - set(FIRST)))
 EMPS = HERE.parent.parent / "shared" / "emps" / "DATA_EMPS.mat"
 #: Scenarios beside which a script runs.
 IDENTIFIED, TUNED = ("motor", "screw", "gearbox"), ("table4", "feedforward")
+FROM_EMPS = ("emps", "emps_stroke")
 #: What counts as report, and as export: functions by the room they are in.
 REPORT = (
     ("thsa_cosim.report.identify.files", "write_identify"),
@@ -57,6 +53,12 @@ REPORT = (
     ("thsa_cosim.report.page.write", "write_page"),
 )
 EXPORT = (("thsa_cosim.export", "export_fmu"),)
+
+
+def command(name: str) -> str:
+    """The command of a scenario: its kind."""
+    kind: str = tomllib.loads((SCENARIOS / f"{name}.toml").read_text(encoding="utf-8"))["kind"]
+    return kind
 
 
 def one(name: str, folder: Path) -> dict[str, Any]:
@@ -74,10 +76,10 @@ def one(name: str, folder: Path) -> dict[str, Any]:
         for module, function in places:
             _clocked(module, function, part, spent)
     runs = _counted()
-    data = ["--fit", str(EMPS)] if name == "emps" else []
+    data = ["--fit", str(EMPS), "--validate", str(EMPS)] if name in FROM_EMPS else []
     code = run_command(
         [
-            COMMANDS[name],
+            command(name),
             str(SCENARIOS / f"{name}.toml"),
             *data,
             "-o",
@@ -131,39 +133,47 @@ def _clocked(module: str, function: str, part: str, spent: dict[str, float]) -> 
 
 def bare(name: str) -> float:
     """CPU seconds of one simulation of the scenario alone, the mean over its cases."""
-    from thsa_cosim.fmu.archive import unpack
-    from thsa_cosim.fmu.plant import Plant
+    from thsa_cosim.system import open_plant, unpack
 
     spent = []
     for fmu, experiments, values in _experiments(name):
         with tempfile.TemporaryDirectory() as folder:
             unpack(fmu.path, Path(folder))
-            plant = Plant(fmu, Path(folder))
-            for experiment in experiments:
-                start = {**experiment.fixed, **values}
-                drive = (experiment.inputs, experiment.outputs, experiment.time)
-                plant.run(start, *drive, tolerance=experiment.tolerance)
-                begin = time.process_time()
-                for _ in range(5):
+            with open_plant(fmu, Path(folder)) as plant:
+                for experiment in experiments:
+                    start = {**experiment.fixed, **values}
+                    drive = (experiment.inputs, experiment.outputs, experiment.time)
                     plant.run(start, *drive, tolerance=experiment.tolerance)
-                spent.append((time.process_time() - begin) / 5.0)
-            plant.close()
+                    begin = time.process_time()
+                    for _ in range(5):
+                        plant.run(start, *drive, tolerance=experiment.tolerance)
+                    spent.append((time.process_time() - begin) / 5.0)
     return sum(spent) / len(spent)
 
 
 def _experiments(name: str) -> Any:
-    if COMMANDS[name] == "tune":
-        from thsa_cosim.scenario import load
-        from thsa_cosim.tune.problem import build_groups
+    """(FMU, experiments, start values) of every point of the scenario."""
+    from thsa_cosim.diagnosis.fitting.trials import trials_of
+    from thsa_cosim.scenario import load
+    from thsa_cosim.study import build_case
+    from thsa_cosim.tune.problem import build_groups
 
+    kind = command(name)
+    if kind == "tune":
         tuned = load(SCENARIOS / f"{name}.toml")
         middle = tuned.parameters.assignments(tuned.before)
         yield tuned.fmu, [case.experiment for case in build_groups(tuned)[0].cases], middle
         return
     for scenario, points in _points(name):
+        if kind == "diagnose":
+            yield scenario.fmu, [trial.case.experiment("bare", None) for trial in trials_of(scenario)], {}
+            continue
         for point in points:
             values = point.space.assignments(point.space.decode(_middle(point.space.dimension)))
             yield scenario.fmu, [case.experiment("bare", None) for case in point.cases], values
+        for recording in () if points else scenario.validate:
+            case = build_case(scenario, recording, scenario.fixed_for(recording.name))
+            yield scenario.fmu, [case.experiment("bare", None)], {}
 
 
 def _middle(dimension: int) -> Any:
@@ -176,10 +186,12 @@ def _points(name: str) -> Any:
     from thsa_cosim.identify.problem import build_point
     from thsa_cosim.scenario import StagedScenario, load
 
-    study = load(SCENARIOS / f"{name}.toml", **({"fit": [EMPS]} if name == "emps" else {}))
+    files = {"fit": [EMPS], "validate": [EMPS]} if name in FROM_EMPS else {}
+    study = load(SCENARIOS / f"{name}.toml", **files)
     parts = [s.scenario for s in study.stages] if isinstance(study, StagedScenario) else [study]
     for scenario in parts:
-        yield scenario, [build_point(scenario, p) for p in scenario.points]
+        searched = scenario.kind == "identify" and len(scenario.parameters)
+        yield scenario, [build_point(scenario, p) for p in scenario.points] if searched else []
 
 
 def task(name: str, count: int) -> list[dict[str, Any]]:
@@ -229,7 +241,7 @@ def task(name: str, count: int) -> list[dict[str, Any]]:
 
 def measure(name: str, output: Path, script_points: int, start_s: float) -> None:
     """Print one line of the table, and the comparison with the script where there is one."""
-    if name == "emps" and not EMPS.exists():
+    if name in FROM_EMPS and not EMPS.exists():
         print(f"{name:12s} left out: {EMPS} is not there")
         return
     folder = output / name
@@ -239,12 +251,17 @@ def measure(name: str, output: Path, script_points: int, start_s: float) -> None
         capture_output=True,
         text=True,
         check=False,
+        env=_installed(),
     )
     wall = time.perf_counter() - begin
+    said = " ".join(done.stderr.split())[-300:]
     if done.returncode or not done.stdout:
-        print(f"{name}: {done.stderr.strip().splitlines()[-1:]}")
+        print(f"{name:14s} failed: {said}", flush=True)
         return
     spent = json.loads(done.stdout.splitlines()[-1])
+    if not (folder / "result.json").exists():
+        print(f"{name:14s} left out, exit code {spent['code']}: {said}", flush=True)
+        return
     result, each = json.loads((folder / "result.json").read_text()), bare(name)
     total = sum(spent[k] for k in ("import", "parent", "workers", "report", "export"))
     parts = "  ".join(f"{k} {spent[k]:.1f}" for k in ("import", "parent", "workers", "report", "export"))
@@ -262,12 +279,20 @@ def measure(name: str, output: Path, script_points: int, start_s: float) -> None
         _beside_tuning(name, result, total)
 
 
-def python_with_numpy() -> float:
-    """CPU seconds of an empty process that has imported NumPy: no worker can start for less."""
+NUMPY, STUDY = "import numpy", "import numpy, scipy.optimize, fmpy, pandas"
+
+
+def start_of(statement: str) -> float:
+    """CPU seconds of an empty process that runs ``statement``: no worker starts for less than NUMPY."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, "-c", "import numpy"], check=True)
+    subprocess.run([sys.executable, "-c", statement], check=True, env=_installed())
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def _installed() -> dict[str, str]:
+    """This environment, with bytecode: pip compiles it, and a development machine may have it turned off."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
 def _beside_tuning(name: str, result: dict[str, Any], total: float) -> None:
@@ -310,7 +335,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("scenarios", nargs="*", metavar="SCENARIO", help=", ".join(COMMANDS))
+    parser.add_argument("scenarios", nargs="*", metavar="SCENARIO", help=", ".join(SHIPPED))
     parser.add_argument("--script-points", type=int, default=8)
     parser.add_argument("--output", type=Path)
     parser.add_argument("--one", help=argparse.SUPPRESS)
@@ -318,9 +343,13 @@ def main() -> None:
     if options.one:
         print("\n" + json.dumps(one(options.one, options.output)))
         return
-    start_s = min(python_with_numpy() for _ in range(3))
+    import thsa_cosim
+
+    compileall.compile_dir(str(Path(thsa_cosim.__file__).parent), quiet=2)
+    start_s, floor_s = (min(start_of(statement) for _ in range(3)) for statement in (NUMPY, STUDY))
+    print(f"floor: {floor_s:.2f} s for {STUDY!r}, {start_s:.2f} s for {NUMPY!r} in a worker")
     with tempfile.TemporaryDirectory() as folder:
-        for name in options.scenarios or COMMANDS:
+        for name in options.scenarios or SHIPPED:
             measure(name, options.output or Path(folder), options.script_points, start_s)
 
 

@@ -4,8 +4,6 @@ In a checkout these are the folders ``modelica``, ``fmus`` and ``scenarios``; a 
 side by side as in the checkout, so that the paths in a scenario hold in both.
 """
 
-import shutil
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,6 +52,8 @@ def copy_example(name: str, folder: Path) -> list[Path]:
     Files keep their places (``scenarios/motor.toml``, ``fmus/Motor.fmu``), so that several examples share them.
     InputError if ``name`` is unknown, or a file of ``folder`` differs from the one that would be copied.
     """
+    import shutil  # with its compressors half a command's start
+
     known = examples()
     if name not in known:
         raise InputError(
@@ -77,6 +77,8 @@ def copy_example(name: str, folder: Path) -> list[Path]:
 
 
 def _example(path: Path) -> Example:
+    import tomllib
+
     content = tomllib.loads(path.read_text(encoding="utf-8"))
     needs, missing = [path], []
     for text in _texts(content):

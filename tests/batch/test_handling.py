@@ -10,8 +10,9 @@ from fmu_sources import build
 from tests.fmu.test_plant import lag
 from thsa_cosim.batch import Experiment, Job, LocalRunner
 from thsa_cosim.batch.handling import largest_change, try_input_handling
+from thsa_cosim.batch.own_step import moves_within, own_step
 from thsa_cosim.errors import ParameterError
-from thsa_cosim.fmu import Plant
+from thsa_cosim.fmu import Plant, read_description
 from thsa_cosim.scenario.handling import settle_handling
 from thsa_cosim.scenario.model import SimulationTable
 from thsa_cosim.signals import Signals
@@ -91,3 +92,53 @@ def test_a_drive_exported_by_dymola() -> None:
     assert trial.best.mode == "mean"
     assert errors["mean"] < 1e-4
     assert errors["derivative"] > 1e-2
+
+
+def test_an_fmu_that_steps_by_itself_is_compared_with_no_shorter_step() -> None:
+    """Between two of its own steps it shows the later one."""
+    coarse = np.linspace(0.0, 1.0, 101)
+    wave = Signals(coarse, {"u": np.sin(9.0 * coarse)})
+    trial = try_input_handling(Experiment("own", build.habits2("OWN_STEP"), wave, ("y",), coarse))
+    assert trial.best is None
+    assert trial.sentence().startswith("it steps by itself, every 0.01 s")
+    assert "simulation.step" not in trial.sentence()
+    dense = np.linspace(0.0, 1.0, 501)
+    trial = try_input_handling(Experiment("own", build.habits2("OWN_STEP"), wave, ("y",), dense))
+    assert trial.sentence().endswith("set simulation.step = 0.01")
+    plain = try_input_handling(Experiment("plain", build.habits2(), wave, ("y",), coarse))
+    assert plain.best is not None
+    assert plain.best.mode == "mean"
+
+
+def test_inputs_that_are_held_are_no_step_of_the_fmus_own() -> None:
+    fmu = read_description(build.habits2())
+    assert moves_within(fmu, None)
+    assert moves_within(fmu, Signals(TIME, {"u": TIME}))
+    assert not moves_within(fmu, Signals(TIME, {"u": TIME}, {}, frozenset({"u"})))
+    stairs = np.repeat(np.arange(20.0), 4)
+    time = np.arange(80.0)
+    assert own_step(time, {"a": stairs}) == 4.0
+    assert own_step(time, {"a": stairs, "b": time}) is None
+    assert own_step(time, {"a": 0.0 * time}) is None
+
+
+@pytest.mark.parametrize("late", [-3, -1, 1, 3])
+def test_a_jump_may_come_a_little_earlier_or_later(late: int) -> None:
+    time = np.linspace(0.0, 10.0, 1001)
+    wanted = {"y": 0.1 * time + (time >= 5.0)}
+    found = {"y": 0.1 * time + (time >= 5.0 + 0.01 * late - 1e-9)}
+    assert largest_change(wanted, found)[0] > 0.4
+    assert largest_change(wanted, found, jumps=True)[0] < 0.01
+    much_later = {"y": 0.1 * time + (time >= 5.2)}
+    assert largest_change(wanted, much_later, jumps=True)[0] > 0.4
+    higher = {"y": wanted["y"] + 0.2 * (time >= 5.0)}
+    assert largest_change(wanted, higher, jumps=True)[0] > 0.09
+
+
+def test_a_signal_that_switches_all_the_time_is_compared_by_its_integral() -> None:
+    beat = np.arange(1001) % 5
+    wanted = {"y": (beat < 2) * 1.0}
+    shifted = {"y": np.roll(wanted["y"], 1)}
+    assert largest_change(wanted, shifted)[0] == 1.0
+    assert largest_change(wanted, shifted, jumps=True)[0] < 0.005
+    assert largest_change(wanted, {"y": (beat < 3) * 1.0}, jumps=True)[0] > 0.3

@@ -8,7 +8,7 @@ import pytest
 from fmu_sources.build import HABITS2, habits2, library, write_fmu
 
 from thsa_cosim.batch import Experiment, Job, LocalRunner
-from thsa_cosim.check import Finding, Verdict, check_fmu, trials
+from thsa_cosim.check import Finding, Verdict, bench, check_fmu
 from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu import read_description
 from thsa_cosim.fmu.probe import missing_binary
@@ -78,6 +78,7 @@ def test_a_licence_that_is_lost_before_the_stop_time_fails(tmp_path: Path) -> No
     assert "the licence was lost; with its inputs at rest it fails, too" in found["runs"].text
 
 
+@pytest.mark.slow
 def test_a_duration_that_nobody_declared_is_said(tmp_path: Path) -> None:
     xml = HABITS2.replace("{flags}", "").replace('stopTime="1" ', "")
     path = write_fmu(tmp_path / "endless.fmu", xml, library("habits2.c"), "habits2")
@@ -97,9 +98,18 @@ def test_a_jump_between_two_communication_points_is_no_error_of_the_step() -> No
     assert found["communication step"].verdict is not Verdict.FAILED
 
 
+def test_an_fmu_that_steps_by_itself_is_no_failure_and_told_no_shorter_step() -> None:
+    found = lines(habits2("OWN_STEP"))
+    assert found["communication step"].verdict is Verdict.WARNING
+    assert "it steps by itself, every 0.01 s" in found["communication step"].text
+    assert "use that step" not in found["communication step"].text
+    assert found["inputs"].verdict is Verdict.NOT_TRIED
+
+
+@pytest.mark.slow
 def test_a_slow_fmu_is_tried_over_its_begin(monkeypatch: pytest.MonkeyPatch) -> None:
     """100 steps take 0.5 s at least, where a run may take 0.2 s, or is killed."""
-    monkeypatch.setattr(trials, "LONGEST_RUN", 0.2)
+    monkeypatch.setattr(bench, "LONGEST_RUN", 0.2)
     slow = habits2("SLOW=5000")
     found = lines(slow)
     assert found["runs"].verdict is Verdict.WARNING

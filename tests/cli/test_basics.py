@@ -1,5 +1,6 @@
 """The command line around the studies: help, versions, one sentence per mistake, never a traceback."""
 
+import os
 import shlex
 import subprocess
 import sys
@@ -197,3 +198,20 @@ def test_the_command_to_continue_is_the_one_that_was_given_with_its_folder() -> 
     words = shlex.split(given.repeat("identify", Path("here")))
     fit = ["--fit", "a.csv", "--fit", "b.csv", "--validate", "c.csv"]
     assert words == ["thsa-cosim", "identify", "s.toml", *fit, "--workers", "2", "-o", "here"]
+
+
+@pytest.mark.parametrize(("given", "threads"), [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2)])
+def test_a_command_computes_with_one_thread_unless_the_user_sets_more(given: dict[str, str], threads: int):
+    program = (
+        "from thsa_cosim.cli import run_command; run_command(['--version'])\n"
+        "import numpy, scipy.linalg, threadpoolctl\n"
+        "print({p['num_threads'] for p in threadpoolctl.threadpool_info() if p['internal_api'] == 'openblas'})"
+    )
+    unset = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=unset | given, capture_output=True, text=True, check=True
+    )
+    found = done.stdout.splitlines()[-1]
+    if found == "set()":
+        pytest.skip("NumPy does not use OpenBLAS here")
+    assert found == f"{{{min(threads, os.cpu_count() or 1)}}}"

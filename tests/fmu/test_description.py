@@ -175,3 +175,12 @@ def test_archives_that_unpack_to_much_more_than_they_are_are_refused(tmp_path: P
         with pytest.raises(FmuError, match=says):
             refuse(path)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_draft_of_the_standard_is_refused_by_its_name(tmp_path: Path) -> None:
+    xml = build.LAG3.format(updates="false").replace('fmiVersion="3.0"', 'fmiVersion="3.0-beta.3"')
+    path = tmp_path / "draft.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", xml)
+    with pytest.raises(FmuError, match=r"made for FMI 3\.0-beta\.3, a draft"):
+        read_description(path)

@@ -6,6 +6,7 @@
  * x before the first step. OTHER_START: the parameters start elsewhere than the model description says. PARTS: no step is
  * done further than 4 ms; what is left is for the next call. LICENCE=t: lost after so many seconds. JUMPS: y jumps by 1
  * after 0.2345 s. EULER: one explicit step per communication step. SLOW=t: each step takes so many microseconds.
+ * OWN_STEP: whole steps of 10 ms, as many as it takes to reach the end, as 20-sim does.
  * NAN_ABOVE=u: y is no number where the input is above u. ALONE: no other instance of any such FMU lives in the process.
  * SETUP_FORGETS: fmi2SetupExperiment overwrites start values.
  */
@@ -131,6 +132,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
 #endif
 #ifdef NAN_ABOVE
     if (m->u > NAN_ABOVE) m->y = NAN;
+#endif
+#ifdef OWN_STEP
+    for (; m->time < t + h; m->time += 0.01) m->y += (m->gain * m->u - m->y) * (1.0 - exp(-0.01 / m->tau));
+    return fmi2OK;
 #endif
 #ifdef EULER
     m->y += (m->gain * m->u - m->y) * h / m->tau;

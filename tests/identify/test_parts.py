@@ -41,6 +41,34 @@ def test_a_coarser_simulation_is_interpolated_onto_the_samples() -> None:
     np.testing.assert_allclose(channel.residual(coarse), 0.0, atol=1e-12)
 
 
+def test_means_of_neighbours_are_compared_with_means_and_their_noise_is_smaller() -> None:
+    channel = Channel("a", TIME, TIME**2, noise=0.5, weight=4.0).means(3)
+    assert (channel.mean_of, channel.time.size) == (3, 3)
+    np.testing.assert_allclose(channel.time, [0.1, 0.4, 0.7])
+    np.testing.assert_allclose(channel.measured, (TIME[:9] ** 2).reshape(3, 3).mean(axis=1))
+    curve = Signals(TIME, {"a": TIME**2 + 1.0})
+    finer = np.linspace(0.0, 1.0, 1001)
+    for simulated in (curve, Signals(finer, {"a": finer**2 + 1.0})):
+        np.testing.assert_allclose(channel.residual(simulated), 2.0 / 0.5 * np.sqrt(3.0))
+
+
+def test_means_keep_white_noise_at_one_and_what_the_data_say_about_a_slow_signal() -> None:
+    time, noise = np.arange(60_000) * 1e-3, np.random.default_rng(3).normal(0.0, 0.2, 60_000)
+    still, moved = (Signals(time, {"a": size * np.sin(2.0 * np.pi * time)}) for size in (0.0, 0.1))
+    channel = Channel("a", time, noise, noise=0.2)
+    means = channel.means(6)
+    assert np.std(means.residual(still)) == pytest.approx(1.0, abs=0.02)
+    # What the data say about a slow signal stays: the squares of what it adds have the same sum.
+    whole, pooled = (c.residual(moved) - c.residual(still) for c in (channel, means))
+    assert pooled @ pooled == pytest.approx(whole @ whole, rel=1e-3)
+
+
+def test_a_channel_of_too_few_samples_for_means_stays_as_it_is() -> None:
+    channel = Channel("a", TIME, TIME, noise=1.0)
+    assert channel.means(1) is channel
+    assert channel.means(6) is channel
+
+
 def point(temperature: float | None, **values: float) -> PointResult:
     return PointResult(
         label=f"{temperature} degC",

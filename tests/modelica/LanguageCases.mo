@@ -788,7 +788,8 @@ package LanguageCases "One case of the language each, with a closed form: what a
     der(x)=-2*k*x;
     end B;
     model S
-    replaceable model T=A constrainedby P(k=3);
+    replaceable model T=A
+    constrainedby P(k=3);
     T t;
     end S;
     model M
@@ -2193,6 +2194,859 @@ package LanguageCases "One case of the language each, with a closed form: what a
     end M;
   end FnVectorizedOverVectors;
 
+  package OvPlus
+    operator record V
+      Real x;
+      Real y;
+      encapsulated operator function '+'
+        import LanguageCases.OvPlus.V;
+        input V a;
+        input V b;
+        output V c;
+      algorithm
+        c.x:=a.x+b.x;
+        c.y:=a.y+b.y;
+      end '+';
+      encapsulated operator '-'
+        import LanguageCases.OvPlus.V;
+        function neg
+          import LanguageCases.OvPlus.V;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=-a.x;
+          c.y:=-a.y;
+        end neg;
+        function sub
+          import LanguageCases.OvPlus.V;
+          input V a;
+          input V b;
+          output V c;
+        algorithm
+          c.x:=a.x-b.x;
+          c.y:=a.y-b.y;
+        end sub;
+      end '-';
+      encapsulated operator '*'
+        import LanguageCases.OvPlus.V;
+        function dot
+          import LanguageCases.OvPlus.V;
+          input V a;
+          input V b;
+          output Real s;
+        algorithm
+          s:=a.x*b.x+a.y*b.y;
+        end dot;
+        function scale
+          import LanguageCases.OvPlus.V;
+          input Real k;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=k*a.x;
+          c.y:=k*a.y;
+        end scale;
+      end '*';
+      encapsulated operator 'constructor'
+        function diag
+          import LanguageCases.OvPlus.V;
+          input Real d;
+          output V v;
+        algorithm
+          v.x:=d;
+          v.y:=d;
+        end diag;
+      end 'constructor';
+      encapsulated operator function '=='
+        import LanguageCases.OvPlus.V;
+        input V a;
+        input V b;
+        output Boolean r;
+      algorithm
+        r:=a.x==b.x and a.y==b.y;
+      end '==';
+    end V;
+    model M
+      V a;
+      V b;
+      V c;
+    equation
+      a.x=time;
+      a.y=1;
+      b.x=2*time;
+      b.y=time;
+      c=a+b;
+    end M;
+  end OvPlus;
+
+  package OvDot
+    operator record V
+      Real x;
+      Real y;
+      encapsulated operator function '+'
+        import LanguageCases.OvDot.V;
+        input V a;
+        input V b;
+        output V c;
+      algorithm
+        c.x:=a.x+b.x;
+        c.y:=a.y+b.y;
+      end '+';
+      encapsulated operator '-'
+        import LanguageCases.OvDot.V;
+        function neg
+          import LanguageCases.OvDot.V;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=-a.x;
+          c.y:=-a.y;
+        end neg;
+        function sub
+          import LanguageCases.OvDot.V;
+          input V a;
+          input V b;
+          output V c;
+        algorithm
+          c.x:=a.x-b.x;
+          c.y:=a.y-b.y;
+        end sub;
+      end '-';
+      encapsulated operator '*'
+        import LanguageCases.OvDot.V;
+        function dot
+          import LanguageCases.OvDot.V;
+          input V a;
+          input V b;
+          output Real s;
+        algorithm
+          s:=a.x*b.x+a.y*b.y;
+        end dot;
+        function scale
+          import LanguageCases.OvDot.V;
+          input Real k;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=k*a.x;
+          c.y:=k*a.y;
+        end scale;
+      end '*';
+      encapsulated operator 'constructor'
+        function diag
+          import LanguageCases.OvDot.V;
+          input Real d;
+          output V v;
+        algorithm
+          v.x:=d;
+          v.y:=d;
+        end diag;
+      end 'constructor';
+      encapsulated operator function '=='
+        import LanguageCases.OvDot.V;
+        input V a;
+        input V b;
+        output Boolean r;
+      algorithm
+        r:=a.x==b.x and a.y==b.y;
+      end '==';
+    end V;
+    model M
+      V a;
+      V b;
+      Real s;
+    equation
+      a.x=time;
+      a.y=1;
+      b.x=2*time;
+      b.y=time;
+      s=a*b;
+    end M;
+  end OvDot;
+
+  package OvScale
+    operator record V
+      Real x;
+      Real y;
+      encapsulated operator function '+'
+        import LanguageCases.OvScale.V;
+        input V a;
+        input V b;
+        output V c;
+      algorithm
+        c.x:=a.x+b.x;
+        c.y:=a.y+b.y;
+      end '+';
+      encapsulated operator '-'
+        import LanguageCases.OvScale.V;
+        function neg
+          import LanguageCases.OvScale.V;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=-a.x;
+          c.y:=-a.y;
+        end neg;
+        function sub
+          import LanguageCases.OvScale.V;
+          input V a;
+          input V b;
+          output V c;
+        algorithm
+          c.x:=a.x-b.x;
+          c.y:=a.y-b.y;
+        end sub;
+      end '-';
+      encapsulated operator '*'
+        import LanguageCases.OvScale.V;
+        function dot
+          import LanguageCases.OvScale.V;
+          input V a;
+          input V b;
+          output Real s;
+        algorithm
+          s:=a.x*b.x+a.y*b.y;
+        end dot;
+        function scale
+          import LanguageCases.OvScale.V;
+          input Real k;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=k*a.x;
+          c.y:=k*a.y;
+        end scale;
+      end '*';
+      encapsulated operator 'constructor'
+        function diag
+          import LanguageCases.OvScale.V;
+          input Real d;
+          output V v;
+        algorithm
+          v.x:=d;
+          v.y:=d;
+        end diag;
+      end 'constructor';
+      encapsulated operator function '=='
+        import LanguageCases.OvScale.V;
+        input V a;
+        input V b;
+        output Boolean r;
+      algorithm
+        r:=a.x==b.x and a.y==b.y;
+      end '==';
+    end V;
+    model M
+      V a;
+      V c;
+      V d;
+    equation
+      a.x=time;
+      a.y=1;
+      c=3*a;
+      d=-c-a;
+    end M;
+  end OvScale;
+
+  package OvCtor
+    operator record V
+      Real x;
+      Real y;
+      encapsulated operator function '+'
+        import LanguageCases.OvCtor.V;
+        input V a;
+        input V b;
+        output V c;
+      algorithm
+        c.x:=a.x+b.x;
+        c.y:=a.y+b.y;
+      end '+';
+      encapsulated operator '-'
+        import LanguageCases.OvCtor.V;
+        function neg
+          import LanguageCases.OvCtor.V;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=-a.x;
+          c.y:=-a.y;
+        end neg;
+        function sub
+          import LanguageCases.OvCtor.V;
+          input V a;
+          input V b;
+          output V c;
+        algorithm
+          c.x:=a.x-b.x;
+          c.y:=a.y-b.y;
+        end sub;
+      end '-';
+      encapsulated operator '*'
+        import LanguageCases.OvCtor.V;
+        function dot
+          import LanguageCases.OvCtor.V;
+          input V a;
+          input V b;
+          output Real s;
+        algorithm
+          s:=a.x*b.x+a.y*b.y;
+        end dot;
+        function scale
+          import LanguageCases.OvCtor.V;
+          input Real k;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=k*a.x;
+          c.y:=k*a.y;
+        end scale;
+      end '*';
+      encapsulated operator 'constructor'
+        function diag
+          import LanguageCases.OvCtor.V;
+          input Real d;
+          output V v;
+        algorithm
+          v.x:=d;
+          v.y:=d;
+        end diag;
+      end 'constructor';
+      encapsulated operator function '=='
+        import LanguageCases.OvCtor.V;
+        input V a;
+        input V b;
+        output Boolean r;
+      algorithm
+        r:=a.x==b.x and a.y==b.y;
+      end '==';
+    end V;
+    model M
+      V a;
+      V c;
+    equation
+      a=V(time);
+      c=a+2.0*V(1);
+    end M;
+  end OvCtor;
+
+  package OvConvert
+    operator record V
+      Real x;
+      Real y;
+      encapsulated operator function '+'
+        import LanguageCases.OvConvert.V;
+        input V a;
+        input V b;
+        output V c;
+      algorithm
+        c.x:=a.x+b.x;
+        c.y:=a.y+b.y;
+      end '+';
+      encapsulated operator '-'
+        import LanguageCases.OvConvert.V;
+        function neg
+          import LanguageCases.OvConvert.V;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=-a.x;
+          c.y:=-a.y;
+        end neg;
+        function sub
+          import LanguageCases.OvConvert.V;
+          input V a;
+          input V b;
+          output V c;
+        algorithm
+          c.x:=a.x-b.x;
+          c.y:=a.y-b.y;
+        end sub;
+      end '-';
+      encapsulated operator '*'
+        import LanguageCases.OvConvert.V;
+        function dot
+          import LanguageCases.OvConvert.V;
+          input V a;
+          input V b;
+          output Real s;
+        algorithm
+          s:=a.x*b.x+a.y*b.y;
+        end dot;
+        function scale
+          import LanguageCases.OvConvert.V;
+          input Real k;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=k*a.x;
+          c.y:=k*a.y;
+        end scale;
+      end '*';
+      encapsulated operator 'constructor'
+        function diag
+          import LanguageCases.OvConvert.V;
+          input Real d;
+          output V v;
+        algorithm
+          v.x:=d;
+          v.y:=d;
+        end diag;
+      end 'constructor';
+      encapsulated operator function '=='
+        import LanguageCases.OvConvert.V;
+        input V a;
+        input V b;
+        output Boolean r;
+      algorithm
+        r:=a.x==b.x and a.y==b.y;
+      end '==';
+    end V;
+    model M
+      V a;
+      V c;
+    equation
+      a=V(time);
+      c=a+5.0;
+    end M;
+  end OvConvert;
+
+  package OvSum
+    operator record V
+      Real x;
+      Real y;
+      encapsulated operator function '+'
+        import LanguageCases.OvSum.V;
+        input V a;
+        input V b;
+        output V c;
+      algorithm
+        c.x:=a.x+b.x;
+        c.y:=a.y+b.y;
+      end '+';
+      encapsulated operator '-'
+        import LanguageCases.OvSum.V;
+        function neg
+          import LanguageCases.OvSum.V;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=-a.x;
+          c.y:=-a.y;
+        end neg;
+        function sub
+          import LanguageCases.OvSum.V;
+          input V a;
+          input V b;
+          output V c;
+        algorithm
+          c.x:=a.x-b.x;
+          c.y:=a.y-b.y;
+        end sub;
+      end '-';
+      encapsulated operator '*'
+        import LanguageCases.OvSum.V;
+        function dot
+          import LanguageCases.OvSum.V;
+          input V a;
+          input V b;
+          output Real s;
+        algorithm
+          s:=a.x*b.x+a.y*b.y;
+        end dot;
+        function scale
+          import LanguageCases.OvSum.V;
+          input Real k;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=k*a.x;
+          c.y:=k*a.y;
+        end scale;
+      end '*';
+      encapsulated operator 'constructor'
+        function diag
+          import LanguageCases.OvSum.V;
+          input Real d;
+          output V v;
+        algorithm
+          v.x:=d;
+          v.y:=d;
+        end diag;
+      end 'constructor';
+      encapsulated operator function '=='
+        import LanguageCases.OvSum.V;
+        input V a;
+        input V b;
+        output Boolean r;
+      algorithm
+        r:=a.x==b.x and a.y==b.y;
+      end '==';
+    end V;
+    model M
+      V a[3];
+      V s;
+    equation
+      for i in 1:3 loop
+        a[i]=V(i*time);
+      end for;
+      s=sum(a);
+    end M;
+  end OvSum;
+
+  package OvArray
+    operator record V
+      Real x;
+      Real y;
+      encapsulated operator function '+'
+        import LanguageCases.OvArray.V;
+        input V a;
+        input V b;
+        output V c;
+      algorithm
+        c.x:=a.x+b.x;
+        c.y:=a.y+b.y;
+      end '+';
+      encapsulated operator '-'
+        import LanguageCases.OvArray.V;
+        function neg
+          import LanguageCases.OvArray.V;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=-a.x;
+          c.y:=-a.y;
+        end neg;
+        function sub
+          import LanguageCases.OvArray.V;
+          input V a;
+          input V b;
+          output V c;
+        algorithm
+          c.x:=a.x-b.x;
+          c.y:=a.y-b.y;
+        end sub;
+      end '-';
+      encapsulated operator '*'
+        import LanguageCases.OvArray.V;
+        function dot
+          import LanguageCases.OvArray.V;
+          input V a;
+          input V b;
+          output Real s;
+        algorithm
+          s:=a.x*b.x+a.y*b.y;
+        end dot;
+        function scale
+          import LanguageCases.OvArray.V;
+          input Real k;
+          input V a;
+          output V c;
+        algorithm
+          c.x:=k*a.x;
+          c.y:=k*a.y;
+        end scale;
+      end '*';
+      encapsulated operator 'constructor'
+        function diag
+          import LanguageCases.OvArray.V;
+          input Real d;
+          output V v;
+        algorithm
+          v.x:=d;
+          v.y:=d;
+        end diag;
+      end 'constructor';
+      encapsulated operator function '=='
+        import LanguageCases.OvArray.V;
+        input V a;
+        input V b;
+        output Boolean r;
+      algorithm
+        r:=a.x==b.x and a.y==b.y;
+      end '==';
+    end V;
+    model M
+      V a[2];
+      V b[2];
+      V s[2];
+    equation
+      for i in 1:2 loop
+        a[i]=V(i*time);
+        b[i]=V(1);
+      end for;
+      s=a-b;
+    end M;
+  end OvArray;
+
+  package CxArray
+    operator record Complex
+      Real re;
+      Real im;
+    end Complex;
+    model M
+      Complex a[2];
+      Complex b[2];
+      Complex c[2];
+      Complex k;
+      Complex d[2];
+    equation
+      k.re=0;
+      k.im=1;
+      for i in 1:2 loop
+        a[i].re=time;
+        a[i].im=i;
+        b[i].re=1;
+        b[i].im=1;
+      end for;
+      c=a.*b;
+      d=k*a;
+    end M;
+  end CxArray;
+
+  package CxSum
+    operator record Complex
+      Real re;
+      Real im;
+    end Complex;
+    model M
+      Complex a[2];
+      Complex s;
+    equation
+      for i in 1:2 loop
+        a[i].re=time;
+        a[i].im=i;
+      end for;
+      s=sum(a);
+    end M;
+  end CxSum;
+
+  package FnArrayRow
+    function f
+      input Real u;
+      output Real y;
+    protected
+      Real a[2,2];
+    algorithm
+      a[1,:]:={u,2};
+      y:=a[1,:]*{1,1}+size(a,2);
+    end f;
+    model M
+      Real y;
+    equation
+      y=f(time);
+    end M;
+  end FnArrayRow;
+
+  package RecString
+    record D
+      String n="a";
+      Real k=2;
+    end D;
+    function f
+      input D d;
+      output Real y;
+    algorithm
+      y:=if d.n=="a" then d.k else 0;
+    end f;
+    model M
+      parameter D d;
+      Real y;
+    equation
+      y=f(d)*time;
+    end M;
+  end RecString;
+
+  package RecAssignField
+    record D
+      Real a;
+      Real b;
+    end D;
+    function f
+      input Real u;
+      output D d;
+    algorithm
+      d.a:=u;
+      d.b:=d.a+1;
+    end f;
+    model M
+      D d=f(time);
+    end M;
+  end RecAssignField;
+
+  package AlgoRec
+    record D
+      Real a;
+      Real b;
+    end D;
+    model M
+      D d;
+    algorithm
+      d.a:=time;
+      d.b:=2*d.a;
+    end M;
+  end AlgoRec;
+
+  package WhenArray
+    model M
+      Real x[2](each start=0,each fixed=true);
+      discrete Real k[2](start={1,2},each fixed=true);
+    equation
+      der(x)=k;
+      when time>0.5 then
+        k=pre(k)+{1,1};
+      end when;
+    end M;
+  end WhenArray;
+
+  package WhileBreak
+    function f
+      input Real u;
+      output Integer n;
+    algorithm
+      n:=0;
+      while true loop
+        n:=n+1;
+        if n>4 then
+          break;
+        end if;
+      end while;
+    end f;
+    model M
+      Real y=f(1)*time;
+    end M;
+  end WhileBreak;
+
+  package ForInVector
+    model M
+      Real y;
+    algorithm
+      y:=0;
+      for k in {1,3,5} loop
+        y:=y+k*time;
+      end for;
+    end M;
+  end ForInVector;
+
+  package ForReverse
+    model M
+      Real y;
+    algorithm
+      y:=0;
+      for k in 3:-1:1 loop
+        y:=y*10+k*time;
+      end for;
+    end M;
+  end ForReverse;
+
+  package MinComp
+    model M
+      Real x[3]={time,1-time,0.7};
+      Real y=min(x);
+      Real z=max(x[i]*i for i in 1:3);
+    end M;
+  end MinComp;
+
+  package VecIf
+    model M
+      Real x[2](each start=0,each fixed=true);
+    equation
+      der(x)=if time<0.5 then {1,2} else {3,4};
+    end M;
+  end VecIf;
+
+  package MatrixConcat
+    model M
+      parameter Real A[2,2]=[1,2;3,4];
+      parameter Real B[2,4]=[A,A];
+      parameter Real C[4,2]=[A;A];
+      Real y=B[2,3]*C[4,1]*time;
+    end M;
+  end MatrixConcat;
+
+  package NestedInner
+    model G
+      parameter Real g=2;
+    end G;
+    model A
+      outer G g;
+      Real x(start=0,fixed=true);
+    equation
+      der(x)=g.g;
+    end A;
+    model B
+      A a;
+    end B;
+    model M
+      inner G g(g=7);
+      B b;
+    end M;
+  end NestedInner;
+
+  package ParamArrayDep
+    model M
+      parameter Integer n=3;
+      parameter Real k[n]=linspace(1,3,n);
+      Real x(start=0,fixed=true);
+    equation
+      der(x)=k[2];
+    end M;
+  end ParamArrayDep;
+
+  package StringFn
+    function f
+      input String s;
+      output Real y;
+    algorithm
+      if s=="fast" then
+        y:=3;
+      else
+        y:=1;
+      end if;
+    end f;
+    model M
+      parameter String s="fast";
+      Real x(start=0,fixed=true);
+    equation
+      der(x)=f(s);
+    end M;
+  end StringFn;
+
+  package FinalStart
+    model M
+      Real x(final start=2,fixed=true);
+    equation
+      der(x)=-x;
+    end M;
+  end FinalStart;
+
+  package SampleOffset
+    model M
+      Integer n(start=0,fixed=true);
+      Real x(start=0,fixed=true);
+    equation
+      when sample(0.15,0.2) then
+        n=pre(n)+1;
+      end when;
+      der(x)=n;
+    end M;
+  end SampleOffset;
+
+  package TwoSamples
+    model M
+      Real a(start=0,fixed=true);
+      Integer n(start=0,fixed=true);
+      Integer m(start=0,fixed=true);
+    equation
+      when sample(0.1,0.1) then
+        n=pre(n)+1;
+      end when;
+      when sample(0.2,0.2) then
+        m=pre(m)+n;
+      end when;
+      der(a)=m;
+    end M;
+  end TwoSamples;
+
   model All "one of each, so that one FMU tests them"
     InitAlgLoop.M initAlgLoop;
     InitParamExprStart.M initParamExprStart;
@@ -2359,6 +3213,32 @@ package LanguageCases "One case of the language each, with a closed form: what a
     FnVectorizedTwo.M fnVectorizedTwo;
     FnVectorizedMatrix.M fnVectorizedMatrix;
     FnVectorizedOverVectors.M fnVectorizedOverVectors;
+    OvPlus.M ovPlus;
+    OvDot.M ovDot;
+    OvScale.M ovScale;
+    OvCtor.M ovCtor;
+    OvConvert.M ovConvert;
+    OvSum.M ovSum;
+    OvArray.M ovArray;
+    CxArray.M cxArray;
+    CxSum.M cxSum;
+    FnArrayRow.M fnArrayRow;
+    RecString.M recString;
+    RecAssignField.M recAssignField;
+    AlgoRec.M algoRec;
+    WhenArray.M whenArray;
+    WhileBreak.M whileBreak;
+    ForInVector.M forInVector;
+    ForReverse.M forReverse;
+    MinComp.M minComp;
+    VecIf.M vecIf;
+    MatrixConcat.M matrixConcat;
+    NestedInner.M nestedInner;
+    ParamArrayDep.M paramArrayDep;
+    StringFn.M stringFn;
+    FinalStart.M finalStart;
+    SampleOffset.M sampleOffset;
+    TwoSamples.M twoSamples;
     annotation(experiment(StopTime=1, Tolerance=1e-8));
   end All;
 end LanguageCases;

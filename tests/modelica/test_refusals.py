@@ -120,15 +120,22 @@ def test_a_homotopy_makes_no_difference_while_the_model_runs(tmp_path: Path) -> 
          "the loop of y has several solutions at once"),
         ("model M Real x = true; end M;", "of x = true, one side is a Boolean, the other a number"),
         ("operator record V Real x; encapsulated operator function '+' input V a; input V b; output V c; "
-         "algorithm c.x := a.x; end '+'; end V; model M V a(x=1); V b(x=2); V c = a + b; end M;",
-         r"the operator \+ on the record V is a limit"),
+         "algorithm c.x := a.x; end '+'; end V; model M V a(x=1); V b(x=2); V c = a / b; end M;",
+         r"the record V defines no operator / for these operands"),
+        ("function f input Real u; output Real y; algorithm end f; model M Real y = f(time); end M;",
+         r"f\(\) gives y no value"),
+        ("function f input Real u; output Real y; protected Real a[2]; algorithm a[1] := u; y := sum(a); end f; "
+         "model M Real y = f(time); end M;",
+         "a is used before it has a value"),
+        ("partial model M Real x; end M;", "M is partial; a complete model is needed to export"),
         ("model M Real x(start=1, fixed=true); discrete Real y(start=0); equation der(x) = -x; "
          "when sample(0, x) then y = time; end when; end M;",
          r"the times of a sample\(\) have to be parameters, but depend on x"),
         ("model M parameter Real m = 0; Real x(start=1, fixed=true); Real y; equation der(x) = -x; m*y = x; end M;",
          "singular with the parameters as they are: y cannot be solved from"),
     ],
-    ids=["several solutions", "types", "operator record", "sample at a variable pace", "zero coefficient"],
+    ids=["several solutions", "types", "operator record", "no output", "not assigned",
+         "partial", "sample at a variable pace", "zero coefficient"],
 )  # fmt: skip
 def test_what_would_be_wrong_is_refused_by_name(tmp_path: Path, source: str, said: str) -> None:
     file = tmp_path / "M.mo"
@@ -145,4 +152,15 @@ def test_what_only_a_tool_knows_is_a_named_doubt(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     with pytest.warns(UserWarning, match=r"M.mo:1: terminal\(\) is taken as false"):
+        causal_model(str(file), tmp_path / "none")
+
+
+def test_an_output_without_a_value_in_a_branch_is_a_named_doubt(tmp_path: Path) -> None:
+    file = tmp_path / "M.mo"
+    file.write_text(
+        "model M Real y = f(time); end M; function f input Real u; output Real y; algorithm "
+        "if u > 0.5 then y := 1; end if; end f;",
+        encoding="utf-8",
+    )
+    with pytest.warns(UserWarning, match=r"M.mo:1: f\(\) gives y no value in one of its branches"):
         causal_model(str(file), tmp_path / "none")

@@ -12,7 +12,7 @@ import thsa_cosim as tc
 from thsa_cosim.errors import ScenarioError
 from thsa_cosim.fmu import Plant
 from thsa_cosim.report.page import write_page
-from thsa_cosim.scenario.tune_schema import START_METRICS, StartTable
+from thsa_cosim.scenario.metrics_schema import START_METRICS, StartTable
 from thsa_cosim.signals import Signals
 from thsa_cosim.tune.combine import worst_of
 from thsa_cosim.tune.start import start_terms

@@ -1,6 +1,5 @@
 """Before a study: a first scenario for an FMU and a recording, and what the recordings will determine."""
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +23,8 @@ def init(fmu: Path | str, *recordings: Path | str) -> dict[str, Any]:
     InputError
         If the FMU or the first recording cannot be read, or no recording is given.
     """
+    import tomllib
+
     from thsa_cosim.draft import draft_scenario
     from thsa_cosim.system import read_description
 

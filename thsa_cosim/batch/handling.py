@@ -13,6 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.local import LocalRunner
+from thsa_cosim.batch.own_step import moves_within, own_step
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.fmu.inputs import input_modes, input_variables, is_linear
 from thsa_cosim.fmu.plant import Kind
@@ -132,6 +133,10 @@ def try_input_handling(experiment: Experiment, *, deadline_s: float | None = 60.
             if not outcome.ok or outcome.signals is None:
                 reason = f"an eighth of the step fails: {outcome.reason}"
                 return HandlingTrial("", (), False, reason)
+            step = float(np.median(np.diff(experiment.time)))
+            own = own_step(outcome.signals.time, outcome.signals.values)
+            if own is not None and own > _OWN * step and moves_within(description, experiment.inputs):
+                return HandlingTrial("", (), False, _by_itself(own, step))
             reference = {n: v[::8] for n, v in outcome.signals.values.items()}
             source = "an eighth of the step"
         outcomes = runner.run([Job(trial.name) for trial in trials])
@@ -150,6 +155,16 @@ def try_input_handling(experiment: Experiment, *, deadline_s: float | None = 60.
         not any(np.isfinite(w.error) for w in ways) or any(w.is_consistent for w in ways)
     )
     return HandlingTrial(source, tuple(ways), confirmed)
+
+
+_OWN = 0.4
+"""Share of the communication step from which on an FMU's own step spoils a comparison with an eighth of it."""
+
+
+def _by_itself(own: float, step: float) -> str:
+    said = f"it steps by itself, every {own:.3g} s: communicating more often than that tells nothing"
+    longer = f", and shows values up to {own:.3g} s early; set simulation.step = {own:.3g}"
+    return said + (longer if own > 1.5 * step else "")
 
 
 def _modes(description: FmuDescription, inputs: Signals | None) -> tuple[str, ...]:

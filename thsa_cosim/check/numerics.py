@@ -7,6 +7,7 @@ import numpy as np
 
 from thsa_cosim.batch import Outcome, Status
 from thsa_cosim.batch.handling import HandlingTrial, largest_change
+from thsa_cosim.batch.own_step import own_step
 from thsa_cosim.check.finding import Verdict
 from thsa_cosim.fmu.plant import Kind
 from thsa_cosim.signals import FloatArray, Signals
@@ -36,8 +37,13 @@ def judge_handling(trial: HandlingTrial, kind: Kind) -> Judged:
     return Verdict.WARNING, f"{trial.sentence()}; {remedy}", errors
 
 
-def judge_step(first: Signals, outcome: Outcome, step: float, fixed: bool = False) -> Judged:
-    """What half the communication step changes; ``fixed``: the FMU declares that it takes steps of one size."""
+def judge_step(
+    first: Signals, outcome: Outcome, step: float, fixed: bool = False, within: bool = True
+) -> Judged:
+    """What half the communication step changes; ``fixed``: the FMU declares that it takes steps of one size.
+
+    ``within``: its inputs move between communication points, or it has none.
+    """
     if not outcome.ok or outcome.signals is None:
         if fixed:
             text = f"it takes steps of {step:g} s only, as it declares: what they cost in accuracy cannot be tried"
@@ -51,6 +57,13 @@ def judge_step(first: Signals, outcome: Outcome, step: float, fixed: bool = Fals
     verdict = Verdict.FAILED
     if change <= STEP_WARNING:
         verdict = Verdict.OK if change <= STEP_OK else Verdict.WARNING
+    own = own_step(outcome.signals.time, outcome.signals.values)
+    if own is not None and within and change > STEP_OK:
+        text = (
+            f"it steps by itself, every {own:.3g} s: communicate so, or at a multiple of it; shorter steps show values"
+            f" early ({worst} by {change:.1e} of its range)"
+        )
+        return Verdict.WARNING, text, {"change": change, "own_step_s": own}
     text = f"halving {step:g} s changes {worst} by {change:.1e} of its range"
     return verdict, text if change else "halving it changes nothing", {"change": change}
 

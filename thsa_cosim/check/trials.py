@@ -1,20 +1,18 @@
 """The trials of a check. Every one runs through ``batch``: an FMU that crashes, hangs or floods costs lines only."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Literal
+from collections.abc import Sequence
 
 import numpy as np
 
-from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
-from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined, try_input_handling
+from thsa_cosim.batch import Job, Outcome
+from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined
+from thsa_cosim.batch.own_step import moves_within
 from thsa_cosim.check import coupling, numerics
-from thsa_cosim.check.budget import LONGEST_RUN, SLOW_SHARES, Budget, is_slow
-from thsa_cosim.check.excitation import Excitation
-from thsa_cosim.check.finding import Finding, Verdict
-from thsa_cosim.fmu import FmuDescription, probe
+from thsa_cosim.check.bench import Bench
+from thsa_cosim.check.budget import LONGEST_RUN, Budget
+from thsa_cosim.check.finding import Verdict
+from thsa_cosim.fmu import probe
 from thsa_cosim.fmu.inputs import input_modes, is_ours
-from thsa_cosim.fmu.plant import Backend, Kind, Reuse
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.system.description import SystemDescription
 
@@ -22,123 +20,16 @@ _WARM_UP = 10
 """Cycles before memory is watched: interpreter and allocator settle."""
 _LEAK_BYTES = 2048
 """Growth per cycle that counts as a leak; an interpreter alone stays well below."""
-_SHORT = 200
-"""Communication points of a run that is repeated to watch memory."""
-_CYCLES = 50
 _ONE_BY_ONE = 60
 """Parameters, and inputs, that are tried one by one at most."""
 _MANY_STEPS = 20_000
-_LONG = 3000
 _LARGER = (10.0, 100.0)
-_BY_INPUTS = (Status.NOT_FINITE, Status.FMI_ERROR, Status.FMI_DISCARD, Status.INCOMPLETE)
-"""How a run may fail because its inputs ask too much."""
 _PARTS = (4, 8, 16, 32)
 """Into how many parts a step is divided that turns out to be too long."""
 
 
-class Trials:
+class Trials(Bench):
     """Runs the trials one after the other and collects their lines."""
-
-    def __init__(
-        self,
-        description: FmuDescription,
-        excitation: Excitation,
-        deadline_s: float,
-        on_finding: Callable[[Finding], None] | None,
-    ) -> None:
-        self._description = description
-        self._given = excitation
-        self._values = dict(excitation.values)
-        self._time = excitation.communication_points(description)
-        self._inputs = self._excited()
-        self._deadline = deadline_s
-        self._on_finding = on_finding
-        self._outputs = probe.observed(description)
-        self._kind: Kind = excitation.kind or (
-            "co-simulation" if description.supports_co_simulation else "model-exchange"
-        )
-        self._mode = excitation.input_mode
-        self._handling: HandlingTrial | None = None
-        self._first = Signals(self._time, {})
-        self._halves = True
-        self._budget = Budget()
-        self._rests = False
-        self._slowness = ""
-        self._changed = {
-            name: value
-            for name, value in probe.changed_parameters(description).items()
-            if name not in self._values
-        }
-        self.findings: list[Finding] = []
-
-    def _excited(
-        self, *, times: float = 1.0, only: str | None = None, time: FloatArray | None = None
-    ) -> Signals | None:
-        if self._given.inputs is not None:
-            return self._given.inputs
-        return probe.kinked_inputs(
-            self._description,
-            self._time if time is None else time,
-            ends=self._given.ends,
-            times=times,
-            only=only,
-        )
-
-    def _note(self, name: str, verdict: Verdict, text: str, **values: float) -> None:
-        finding = Finding(name, verdict, text, values)
-        self.findings.append(finding)
-        if self._on_finding is not None:
-            self._on_finding(finding)
-
-    def _take(self, name: str, judged: numerics.Judged) -> None:
-        verdict, text, values = judged
-        self._note(name, verdict, text, **values)
-
-    def _experiment(self, name: str, time: FloatArray, inputs: Signals | None = None) -> Experiment:
-        return Experiment(
-            name,
-            self._description.path,
-            inputs or self._inputs,
-            self._outputs,
-            time,
-            self._values,
-            tolerance=self._given.tolerance,
-            input_mode=self._mode if self._kind == "co-simulation" else None,
-        )
-
-    def _runner(
-        self,
-        reuse: Reuse = "fresh",
-        kind: Kind | None = None,
-        more: Sequence[Experiment] = (),
-        backend: Backend | Literal["auto"] | None = "auto",
-    ) -> LocalRunner:
-        """Open one worker process with "trial", "halved" and "doubled" (step), "short" (footprint) and ``more``."""
-        experiments = [
-            self._experiment("trial", self._time),
-            self._experiment("halved", probe.halved(self._time)),
-            self._experiment("doubled", self._time[::2] if len(self._time) > 2 else self._time),
-            replace(
-                self._experiment("short", self._time[: self._short_points()]),
-                reduce=probe.footprint,
-            ),
-            *more,
-        ]
-        return LocalRunner(
-            experiments,
-            deadline_s=self._deadline,
-            reuse=reuse,
-            kind=kind or self._kind,
-            # The same bits, and a process starts a second earlier than with machine code.
-            backend=("python" if len(self._time) < _LONG else None) if backend == "auto" else backend,
-            recycle_growth_mb=1e6,
-        )
-
-    def _short_runs(self, cycles: int) -> int:
-        return self._budget.runs(_WARM_UP + cycles, self._short_points())
-
-    def _short_points(self) -> int:
-        return self._budget.points_for(_WARM_UP + _CYCLES, min(len(self._time), _SHORT))
 
     # -- lines ------------------------------------------------------------------------------------------
     def description_lines(self) -> None:
@@ -175,7 +66,7 @@ class Trials:
             )
             return False
         whole = self._time
-        outcome, doubt = self._first_outcome()
+        outcome, doubt = self.first_outcome()
         if not outcome.ok or outcome.signals is None:
             self._note("runs", Verdict.FAILED, f"{outcome.status}: {outcome.reason}")
             for name in later:
@@ -198,70 +89,6 @@ class Trials:
         )
         return True
 
-    @property
-    def _is_free(self) -> bool:
-        """Whether nobody said how long to simulate."""
-        return self._given.time is None and self._given.duration is None
-
-    def _first_outcome(self) -> tuple[Outcome, str]:
-        """The first run that succeeds, whole if possible, and what is to be said where it is not."""
-        whole = self._time
-        outcome = self._try()
-        reason, doubt = outcome.reason, ""
-        if outcome.status is Status.TIMEOUT and self._is_free:
-            outcome, doubt = self._cut_to_what_is_fast(outcome)
-        elif not outcome.ok and self._may_be_cut():
-            self._shorten(self._given.communication_points(self._description, cut=True))
-            outcome = self._try()
-            done = f"{np.ptp(self._time):g} s of {np.ptp(whole):g} s"
-            doubt = f"; only {done}, as it fails in longer steps ({reason})"
-        if not outcome.ok and self._given.kind is None and self._kind == "co-simulation":
-            self._shorten(whole)
-            outcome, doubt = self._fall_back(outcome)
-        if not outcome.ok and outcome.status in _BY_INPUTS:
-            outcome, doubt = self._at_rest(outcome)
-        return outcome, doubt
-
-    def _at_rest(self, failed: Outcome) -> tuple[Outcome, str]:
-        """Hold inputs of which nobody said where they run: does it fail because of them?"""
-        if self._given.inputs is not None or self._inputs is None or self._given.ends:
-            return failed, ""
-        moving, self._inputs = self._inputs, self._still()
-        outcome = self._try()
-        if outcome.ok:
-            self._rests = True
-            doubt = f"; with inputs that move it fails ({failed.reason}): say how far they run (--input NAME=VALUE)"
-            return outcome, doubt
-        self._inputs = moving
-        return replace(failed, reason=f"{failed.reason}; with its inputs at rest it fails, too"), ""
-
-    def _still(self) -> Signals:
-        assert self._inputs is not None
-        held = {n: np.full(len(self._time), v[0]) for n, v in self._inputs.values.items()}
-        return Signals(self._time, held)
-
-    def _shorten(self, time: FloatArray) -> None:
-        self._time = time
-        self._inputs = self._excited()
-
-    def _cut_to_what_is_fast(self, killed: Outcome) -> tuple[Outcome, str]:
-        """Run the begin of an experiment that outlasts the deadline, unless it hangs there."""
-        whole = self._time
-        for share in SLOW_SHARES:
-            points = max(int(share * len(whole)), 2)
-            self._shorten(whole[:points])
-            outcome = self._run_once()
-            if outcome.status is Status.TIMEOUT:
-                continue
-            if not outcome.ok or not is_slow(outcome.duration_s, share, self._deadline):
-                break
-            fast = int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))
-            self._shorten(whole[:fast])
-            outcome = self._try()
-            done = f"{np.ptp(self._time):.3g} s of {np.ptp(whole):g} s"
-            return outcome, f"; only {done}: all of it takes more than {self._deadline:g} s (see --deadline)"
-        return killed, ""
-
     def _whose_duration(self) -> str:
         stop = self._description.default_experiment.stop
         given = self._given.duration is not None or self._given.time is not None
@@ -275,51 +102,6 @@ class Trials:
         if self._rests:
             return "inputs at their start values"
         return "inputs ramping away from their start values, with kinks"
-
-    def _try(self) -> Outcome:
-        """Run once; find out how inputs are to be given, and run so."""
-        outcome = self._run_once()
-        if outcome.ok and outcome.duration_s > LONGEST_RUN and self._is_free:
-            seconds, points = np.ptp(self._time), len(self._time)
-            self._shorten(self._time[: int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))])
-            self._slowness = (
-                f"; it took {outcome.duration_s:.3g} s, so what follows is tried over"
-                f" {np.ptp(self._time):.3g} s of {seconds:g} s"
-            )
-            outcome = self._run_once()
-        told = self._given.input_mode is not None or is_ours(self._description)
-        if told or not outcome.ok or self._kind != "co-simulation":
-            return outcome
-        self._handling = try_input_handling(
-            self._experiment("handling", self._time), deadline_s=self._deadline
-        )
-        best = self._handling.best
-        self._mode = None if best is None else best.mode
-        return self._run_once()
-
-    def _run_once(self) -> Outcome:
-        with self._runner() as runner:
-            return runner.run([Job("trial")])[0]
-
-    def _may_be_cut(self) -> bool:
-        given = self._given
-        return given.time is None and given.step is None and given.duration is None and self._was_coarsened()
-
-    def _was_coarsened(self) -> bool:
-        """Whether the steps are longer than what the FMU declares, so that the stop time is reached."""
-        declared = self._given.communication_points(self._description, cut=True)
-        return bool(self._time[1] - self._time[0] > 1.001 * (declared[1] - declared[0]))
-
-    def _fall_back(self, failed: Outcome) -> tuple[Outcome, str]:
-        """Try Model Exchange where Co-Simulation does not run."""
-        if not self._description.supports_model_exchange or self._description.fmi_version == "1.0":
-            return failed, ""
-        self._kind = "model-exchange"
-        outcome = self._try()
-        if not outcome.ok:
-            self._kind = "co-simulation"
-            return failed, ""
-        return outcome, f'; Co-Simulation fails ({failed.reason}): set interface = "model-exchange"'
 
     def inputs_lines(self) -> None:
         """Say how inputs are given, and which of them do something."""
@@ -424,17 +206,22 @@ class Trials:
             return
         step = float(self._time[1] - self._time[0])
         fixed = not self._description.capabilities.get("canHandleVariableCommunicationStepSize")
-        judged = numerics.judge_step(self._first, halved, step, fixed)
+        judged = numerics.judge_step(self._first, halved, step, fixed, self._moves_within(self._inputs))
         self._halves = halved.ok
         if judged[0] is not Verdict.OK and self._may_be_cut():
             self._take(name, self._declared_step(step, fixed))
             return
         if judged[0] is Verdict.FAILED:
-            judged = numerics.judge_shorter_steps(judged, [(step / 2, halved), *self._shorter_runs(step)])
+            judged = numerics.judge_shorter_steps(
+                judged, [(step / 2, halved), *self._shorter_runs(step, self._time, self._inputs)]
+            )
         self._take(name, judged)
         if len(self._time) > 2 and self._given.inputs is None:  # else the step is the user's
             change = judged[2].get("change", 0.0)
             self._take("longer step", numerics.judge_longer_step(self._first, doubled, step, change))
+
+    def _moves_within(self, inputs: Signals | None) -> bool:
+        return moves_within(self._description, inputs)
 
     def _declared_step(self, coarse: float, fixed: bool) -> numerics.Judged:
         """Halve the step that the FMU declares, over the begin of the experiment."""
@@ -446,14 +233,20 @@ class Trials:
         if whole.signals is None:
             text = f"{coarse:g} s is too long, and its own {step:g} s fails: {whole.status}: {whole.reason}"
             return Verdict.FAILED, text, {}
-        verdict, text, values = numerics.judge_step(whole.signals, halved, step, fixed)
+        judged = numerics.judge_step(whole.signals, halved, step, fixed, self._moves_within(inputs))
+        if judged[0] is Verdict.FAILED:
+            shorter = [(step / 2, halved), *self._shorter_runs(step, time, inputs)]
+            judged = numerics.judge_shorter_steps(judged, shorter)
+        verdict, text, values = judged
         text = f"{text}, over {np.ptp(time):g} s; {coarse:g} s, with which the stop time was reached, is too long"
         return verdict, text, values
 
-    def _shorter_runs(self, step: float) -> list[tuple[float, Outcome]]:
+    def _shorter_runs(
+        self, step: float, time: FloatArray, inputs: Signals | None
+    ) -> list[tuple[float, Outcome]]:
         """Runs with a quarter of the step and less, as far as they are affordable."""
         parts = [n for n in _PARTS if self._budget.run_s * n < LONGEST_RUN * 10]
-        finer = [self._experiment(f"h/{n}", refined(self._time, n)) for n in parts]
+        finer = [self._experiment(f"h/{n}", refined(time, n), inputs) for n in parts]
         if not finer:
             return []
         with self._runner(more=finer) as runner:

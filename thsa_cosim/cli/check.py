@@ -1,7 +1,8 @@
 """The command ``check``: what an FMU, a recording or a scenario is, and what it can be trusted with."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from thsa_cosim.errors import ScenarioError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from thsa_cosim.check import CheckReport
+    from thsa_cosim.check import CheckReport, Finding
     from thsa_cosim.identify.sensitivity import PointSensitivity
     from thsa_cosim.scenario import Scenario, StagedScenario, TuneScenario
 
@@ -107,8 +108,20 @@ def _fmu(path: Path, given: Mapping[str, Any], deadline: float) -> Checked:
     from thsa_cosim.check import Excitation, check_fmu
     from thsa_cosim.report.check import print_check
 
-    report = check_fmu(path, excitation=Excitation(**given), deadline_s=deadline)
+    with _trying(path) as on_finding:
+        report = check_fmu(path, excitation=Excitation(**given), deadline_s=deadline, on_finding=on_finding)
     return {"kind": "fmu", **report.to_dict()}, lambda out: print_check(out, report)
+
+
+@contextmanager
+def _trying(path: Path) -> "Iterator[Callable[[Finding], None] | None]":
+    """On a terminal, say what was tried last: a slow FMU takes minutes."""
+    out = console(stderr=True)
+    if not out.is_terminal:
+        yield None
+        return
+    with out.status(f"trying {path.name}") as status:
+        yield lambda finding: status.update(f"trying {path.name}: {finding.name} {finding.verdict}")
 
 
 def _recording(path: Path) -> Checked:

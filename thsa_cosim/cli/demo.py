@@ -4,16 +4,15 @@ import importlib.util
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 
-from thsa_cosim.api import open_study
 from thsa_cosim.cli.options import PATH, console
 from thsa_cosim.errors import StudyError
-from thsa_cosim.shipped import copy_example
 
 _EXAMPLES = ("motor", "table4", "driven")
 _NEEDED = (*(f"scenarios/{name}.toml" for name in _EXAMPLES), "modelica/THSA")
@@ -139,11 +138,18 @@ def _steps(root: Path, output: Path, quick: bool, can_export: bool) -> list[Step
     ]
 
 
+def _result(folder: Path) -> Mapping[str, Any]:
+    """What a step's study found."""
+    from thsa_cosim.api import open_study
+
+    return open_study(folder).result
+
+
 def _effects(step: Step) -> tuple[str, ...]:
     """The effects that a diagnosis named."""
     if step.words[0] != "diagnose" or step.folder is None:
         return ()
-    return tuple(str(effect["name"]) for effect in open_study(step.folder).result["effects"])
+    return tuple(str(effect["name"]) for effect in _result(step.folder)["effects"])
 
 
 def _run(step: Step) -> None:
@@ -168,7 +174,7 @@ def _checked(file: Path) -> list[str]:
 
 
 def _identified(folder: Path) -> list[str]:
-    result = open_study(folder).result
+    result = _result(folder)
     away = {name: (law.get("largest_deviation") or {}).get("law") for name, law in result["laws"].items()}
     told = ", ".join(f"{name} {100.0 * value:.2g} %" for name, value in away.items() if value is not None)
     ratios: dict[str, list[float]] = {}
@@ -183,7 +189,7 @@ def _identified(folder: Path) -> list[str]:
 
 
 def _tuned(folder: Path) -> list[str]:
-    result = open_study(folder).result
+    result = _result(folder)
     before, after, units = result["before"], result["after"], result["units"]
     gains = [f"{n} {before['gains'][n]:.3g} → {v:.3g} {units[n]}" for n, v in after["gains"].items()]
     change = []
@@ -194,7 +200,7 @@ def _tuned(folder: Path) -> list[str]:
 
 
 def _diagnosed(folder: Path) -> list[str]:
-    result = open_study(folder).result
+    result = _result(folder)
     found = [
         f"{effect['name']}: {name} = {value['value']:.3g} ± {_known(value.get('stderr')):.1g} {value['unit']}"
         for effect in result["effects"]
@@ -215,6 +221,8 @@ def _data(output: Path) -> Path:
     """Return the folder with the shipped data: this one in a checkout, else ``output``, into which they are copied."""
     if all(Path(name).exists() for name in _NEEDED):
         return Path()
+    from thsa_cosim.shipped import copy_example
+
     for name in _EXAMPLES:
         copy_example(name, output)
     return output

@@ -76,8 +76,21 @@ def main() -> None:
     sys.exit(run_command(sys.argv[1:]))
 
 
+_ONE_THREAD = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+
+
 def run_command(arguments: list[str]) -> int:
     """Run one command line; return its exit code. Errors become one sentence on stderr."""
+    # Threads that wait for each other over products of a few columns cost ten times the products; read by the first
+    # import of NumPy, of SciPy. Whoever sets them keeps them.
+    for name in _ONE_THREAD:
+        os.environ.setdefault(name, "1")
     try:
         code = cli.main(args=arguments, prog_name="thsa-cosim", standalone_mode=False)
         return code if isinstance(code, int) else 0

@@ -3,7 +3,7 @@
 Both are plain picklable objects; a worker receives them once per study with its experiments.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,8 @@ class Channel:
 
     ``noise``: one standard deviation in that unit; ``weight`` multiplies the squared error. The samples
     outside the cost's window are left out beforehand. ``band``: Hz below which signals are compared, after the same
-    filter without phase shift; ``measured`` has gone through it.
+    filter without phase shift; ``measured`` has gone through it. ``fine``: the times (n·k,) of the samples, where
+    ``time``, ``measured`` and ``noise`` are of the means of k neighbours.
     """
 
     name: str
@@ -27,14 +28,40 @@ class Channel:
     noise: float
     weight: float = 1.0
     band: float | None = None
+    fine: FloatArray | None = None
+
+    @property
+    def mean_of(self) -> int:
+        """Number of samples that each value is the mean of."""
+        return 1 if self.fine is None else self.fine.size // self.time.size
+
+    def means(self, of: int) -> "Channel":
+        """The same of the means of ``of`` neighbouring samples, simulated as measured; white noise is √of smaller.
+
+        What is left over at the end is dropped; a channel of fewer than two means stays as it is.
+        """
+        count = self.time.size // of
+        if of < 2 or count < 2 or self.fine is not None:
+            return self
+        fine, measured = (values[: count * of] for values in (self.time, self.measured))
+        return replace(
+            self,
+            time=fine.reshape(count, of).mean(axis=1),
+            measured=measured.reshape(count, of).mean(axis=1),
+            noise=self.noise / np.sqrt(of),
+            fine=fine,
+        )
 
     def residual(self, simulated: Signals) -> FloatArray:
         """√weight · (simulated - measured) / noise, (n,); linear between samples where times differ."""
         values = simulated[self.name]
         if self.band is not None:
             values = low_pass(values, self.band, float(np.mean(np.diff(simulated.time))))
-        if simulated.time.shape != self.time.shape or not np.array_equal(simulated.time, self.time):
-            values = np.interp(self.time, simulated.time, values)
+        at = self.time if self.fine is None else self.fine
+        if simulated.time.shape != at.shape or not np.array_equal(simulated.time, at):
+            values = np.interp(at, simulated.time, values)
+        if self.fine is not None:
+            values = values.reshape(self.time.size, -1).mean(axis=1)
         return np.asarray((values - self.measured) * (np.sqrt(self.weight) / self.noise))
 
 

@@ -42,7 +42,14 @@ from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified, identify_model
 from thsa_cosim.diagnosis.fitting.structure import errors, errors_by_recording
-from thsa_cosim.diagnosis.fitting.trials import Trial, spec_of, trials_of, with_fmu, with_wrapper
+from thsa_cosim.diagnosis.fitting.trials import (
+    Trial,
+    note_on_means,
+    spec_of,
+    trials_of,
+    with_fmu,
+    with_wrapper,
+)
 from thsa_cosim.diagnosis.fitting.uncertainty import standard_errors
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, declared_unknowns_of
 from thsa_cosim.diagnosis.results import DiagnosisResult, EmpiricalLaw, StructuredError
@@ -166,7 +173,8 @@ class _Closing:
     def result(self) -> DiagnosisResult:
         """Identify the extended model on its own FMU as the declared one was, and judge both."""
         scenario, found, before = self.scenario, self.found, self._declared()
-        accepted, notes, after = found.accepted, [*self.bench.notes, *found.notes], before
+        accepted, after = found.accepted, before
+        notes = [*self.bench.notes, *note_on_means(self.trials), *found.notes]
         model: Path | None = None
         extended: Path | None = None
         wrapper: Path | None = None

@@ -125,7 +125,7 @@ class Translator:
         if isinstance(value, Enumeration):
             return ca.SX(float(value.index))
         if not isinstance(value, Term):
-            if isinstance(value, str) or value is None:
+            if not isinstance(value, (bool, int, float)):
                 raise ModelicaError(f"a number is needed, not {value!r}.")
             return ca.SX(float(value))
         key = (id(value), events)

@@ -192,6 +192,10 @@ def read_description(path: Path | str) -> FmuDescription:
         if isinstance(error, IndexError):
             message = "its ModelStructure names a variable that is not there"
         raise FmuError(f"{path}: modelDescription.xml cannot be read ({message.rstrip('.')}).") from None
+    if any(draft in raw.fmiVersion for draft in ("alpha", "beta")):
+        raise FmuError(
+            f"{path} was made for FMI {raw.fmiVersion}, a draft that differs from FMI 3.0; export it again."
+        )
     if raw.coSimulation is None and raw.modelExchange is None:
         also = " but Scheduled Execution" if getattr(raw, "scheduledExecution", None) is not None else ""
         raise FmuError(

@@ -57,7 +57,9 @@ class Library:
         try:
             self._dll = _loaded_with_neighbours(path)
         except OSError as error:
-            raise SimulationFailure(Status.LOAD_ERROR, f"{path.name} cannot be loaded: {error}") from None
+            missing = " (install that library)" if "cannot open shared object file" in str(error) else ""
+            reason = f"{path.name} cannot be loaded: {error}{missing}"
+            raise SimulationFailure(Status.LOAD_ERROR, reason) from None
         self._name = path.name
         self._functions: dict[str, Any] = {}
 

@@ -12,6 +12,16 @@ from thsa_cosim.modelica.terms import Scalar, make
 Value = Any  # Scalar, Record, or a list of values
 
 
+class _Unset:
+    """A variable that has no value yet."""
+
+    def __repr__(self) -> str:
+        return "(no value)"
+
+
+UNSET = _Unset()
+
+
 class Record:
     """A value of a record class, by field."""
 
@@ -48,6 +58,15 @@ def elements(value: Value) -> list[Scalar]:
     if isinstance(value, Record):
         return [scalar for part in value.fields.values() for scalar in elements(part)]
     return [value]
+
+
+def unset(value: Value) -> bool:
+    """Whether a value, or what an array begins or ends with, has not been assigned."""
+    while isinstance(value, list) and value:
+        if unset(value[0]):
+            return True
+        value = value[-1]
+    return value is UNSET
 
 
 def each(function: Callable[..., Scalar], *values: Value) -> Value:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 from thsa_cosim.errors import ModelicaError, did_you_mean
-from thsa_cosim.modelica import arrays
-from thsa_cosim.modelica.arrays import Partial, Record, Value, each, elements, fill, promote, shape, total
+from thsa_cosim.modelica import arrays, overload
+from thsa_cosim.modelica.arrays import Partial, Value, each, elements, fill, promote, shape, total
+from thsa_cosim.modelica.overload import holds_records
 from thsa_cosim.modelica.syntax import Syntax
 from thsa_cosim.modelica.terms import Enumeration, Scalar, Term, make, plain, text
 
@@ -116,6 +118,8 @@ def _size(evaluator: Evaluator, expression: Syntax) -> Value:
         found = evaluator.node(arguments[0])
         if not isinstance(found, list):
             found = evaluator.value(arguments[0])
+    elif arguments[0].op == "name" and len(arguments[0].args) == 1 and not arguments[0].args[0][1]:
+        found = evaluator.local[arguments[0].args[0][0]]  # its elements may have no values yet
     else:
         found = evaluator.value(arguments[0])
     sizes = list(shape(found))
@@ -163,11 +167,21 @@ def _linspace(evaluator: Evaluator, expression: Syntax) -> Value:
 
 
 def _sum(evaluator: Evaluator, expression: Syntax) -> Value:
-    return total(elements(evaluator.value(expression.args[1][0])))
+    return _reduced(evaluator, "+", expression)
 
 
 def _product(evaluator: Evaluator, expression: Syntax) -> Value:
-    return total(elements(evaluator.value(expression.args[1][0])), "*", 1.0)
+    return _reduced(evaluator, "*", expression)
+
+
+def _reduced(evaluator: Evaluator, op: str, expression: Syntax) -> Value:
+    """Sum or product of all elements."""
+    value = evaluator.value(expression.args[1][0])
+    if not holds_records(value):
+        return total(elements(value)) if op == "+" else total(elements(value), "*", 1.0)
+    if any(isinstance(v, list) for v in value):
+        raise evaluator.error(expression, "a sum over a matrix of records is a limit of this exporter.")
+    return reduce(lambda a, b: overload.operator(evaluator, op, [a, b], expression), value)
 
 
 def _transpose(evaluator: Evaluator, expression: Syntax) -> Value:
@@ -292,40 +306,6 @@ def _cardinality(evaluator: Evaluator, expression: Syntax) -> Value:
     raise evaluator.error(expression, "cardinality() is deprecated and a limit of this exporter.")
 
 
-def record_operator(evaluator: Evaluator, op: str, a: Value, b: Value, expression: Syntax) -> Value:
-    """Operators of records: those of Complex."""
-    for value in (a, b):
-        kind_of = evaluator.scope.find_class(value.type) if isinstance(value, Record) else None
-        if kind_of is not None and kind_of.definition.name != "Complex":
-            raise evaluator.error(
-                expression,
-                f"the operator {op} on the record {kind_of.qualified} is a limit of this exporter.",
-            )
-    if op in ("+", "-", ".+", ".-") and isinstance(a, Record) and isinstance(b, Record):
-        return each(lambda x, y: make(op.lstrip("."), x, y), a, b)
-    values = [v if isinstance(v, Record) else Record("Complex", {"re": v, "im": 0.0}) for v in (a, b)]
-    if not all({"re", "im"} == set(v.fields) for v in values):
-        raise evaluator.error(expression, f"the operator {op} on records is a limit of this exporter.")
-    (x, y), (u, v) = ((r.fields["re"], r.fields["im"]) for r in values)
-    kind = values[0].type
-
-    def complex_of(re: Scalar, im: Scalar) -> Record:
-        return Record(kind, {"re": re, "im": im})
-
-    def mul(p: Scalar, q: Scalar) -> Scalar:
-        return make("*", p, q)
-
-    if op in ("+", "-"):
-        return complex_of(make(op, x, u), make(op, y, v))
-    if op == "*":
-        return complex_of(make("-", mul(x, u), mul(y, v)), make("+", mul(x, v), mul(y, u)))
-    if op == "/":
-        size = make("+", mul(u, u), mul(v, v))
-        re = make("/", make("+", mul(x, u), mul(y, v)), size)
-        return complex_of(re, make("/", make("-", mul(y, u), mul(x, v)), size))
-    raise evaluator.error(expression, f"the operator {op} on records is a limit of this exporter.")
-
-
 _TABLE: dict[str, Callable[[Any, Syntax], Value]] = {
     "size": _size,
     "ndims": _ndims,
@@ -366,4 +346,4 @@ _TABLE: dict[str, Callable[[Any, Syntax], Value]] = {
     "cardinality": _cardinality,
 }
 
-__all__ = ["SCALAR", "ModelicaError", "call", "extreme", "record_operator", "scalar"]
+__all__ = ["SCALAR", "ModelicaError", "call", "extreme", "scalar"]

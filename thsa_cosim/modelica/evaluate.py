@@ -8,7 +8,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from thsa_cosim.errors import ModelicaError
-from thsa_cosim.modelica import builtin
+from thsa_cosim.modelica import builtin, overload
 from thsa_cosim.modelica.arrays import (
     Partial,
     Record,
@@ -20,9 +20,11 @@ from thsa_cosim.modelica.arrays import (
     fill,
     promote,
     shape,
+    unset,
 )
-from thsa_cosim.modelica.lookup import Lookup
+from thsa_cosim.modelica.lookup import Lookup, written
 from thsa_cosim.modelica.modifier import Binding
+from thsa_cosim.modelica.overload import holds_records
 from thsa_cosim.modelica.scope import Scope, Variable
 from thsa_cosim.modelica.syntax import Syntax
 from thsa_cosim.modelica.terms import (
@@ -144,8 +146,11 @@ class Evaluator(Lookup):
 
     def _unary(self, expression: Syntax) -> Value:
         operator, operand = expression.args
+        value = self.value(operand)
+        if holds_records(value):
+            return overload.operator(self, operator, [value], expression)
         op = {"-": "neg", "not": "not"}[operator]
-        return each(lambda x: make(op, x), self.value(operand))
+        return each(lambda x: make(op, x), value)
 
     def _binary(self, expression: Syntax) -> Value:
         op, left, right = expression.args
@@ -154,8 +159,8 @@ class Evaluator(Lookup):
         if op == "or" and (first := self.value(left)) is True:
             return True
         a, b = (first if op in ("and", "or") else self.value(left)), self.value(right)
-        if isinstance(a, Record) or isinstance(b, Record):
-            return builtin.record_operator(self, op, a, b, expression)
+        if holds_records(a) or holds_records(b):
+            return overload.operator(self, op, [a, b], expression)
         result = binary(op, a, b)
         if self.in_function and op in _RELATIONS:
             result = each(lambda x: make("noEvent", x) if isinstance(x, Term) else x, result)
@@ -294,6 +299,8 @@ class Evaluator(Lookup):
             value = self.subscripted(self.local[first], subscripts, expression)
             for name, further in parts[1:]:
                 value = self.subscripted(self.field(value, name, expression), further, expression)
+            if unset(value):
+                raise self.error(expression, f"{written(expression)} is used before it has a value.")
             return value
         if first == "time" and len(parts) == 1:
             return TIME

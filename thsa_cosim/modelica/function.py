@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from thsa_cosim.modelica import builtin, tables
-from thsa_cosim.modelica.arrays import Record, Value, each, fill, shape
+from thsa_cosim.modelica import builtin, overload, tables
+from thsa_cosim.modelica.arrays import UNSET, Record, Value, each, elements, fill, shape
 from thsa_cosim.modelica.evaluate import Evaluator
 from thsa_cosim.modelica.redeclaration import resolved
 from thsa_cosim.modelica.scope import BUILTIN_TYPES, Element, Scope
-from thsa_cosim.modelica.statements import UNSET, Statements, UnknownStepsError
+from thsa_cosim.modelica.statements import Statements, UnknownStepsError
 from thsa_cosim.modelica.syntax import Component, Equation, Syntax
 from thsa_cosim.modelica.terms import Enumeration
 
@@ -46,7 +46,8 @@ def invoke(
         index = evaluator.fixed(positional[0], where, "the argument of an enumeration's conversion")
         return Enumeration(scope.qualified, scope.definition.literals[index - 1], index)
     if kind == "record" or (kind == "operator" and "record" in scope.definition.prefixes):
-        return _construct(target, positional, keyed, where, evaluator)
+        made = overload.constructed(evaluator, scope, positional, keyed, where)
+        return _construct(target, positional, keyed, where, evaluator) if made is None else made
     if kind == "operator":
         constructor = scope.member_class("fromReal")
         if constructor is not None:
@@ -213,7 +214,12 @@ class _Run:
             if mod is not None and mod.binding is not None:
                 self.env[name] = Evaluator(mod.binding.scope, self.env, True).value(mod.binding.value)
             else:
-                self.env[name] = _default(owner, declaration, Evaluator(owner, self.env, True), where)
+                value = _default(owner, declaration, Evaluator(owner, self.env, True), where)
+                for field, child in (mod.children if mod is not None else {}).items():
+                    if isinstance(value, Record) and field in value.fields and child.binding is not None:
+                        inner = Evaluator(child.binding.scope, self.env, True)
+                        value.fields[field] = inner.value(child.binding.value)
+                self.env[name] = value
 
     def _ordered(self, waiting: list[Any]) -> list[Any]:
         """Declarations whose sizes or bindings use others come after these."""
@@ -253,6 +259,9 @@ class _Run:
                 self.caller.warn(
                     self.where, f"{what}; that of another branch is taken, Modelica leaves it open."
                 )
+        for name in self.outputs:
+            if any(value is UNSET for value in elements(env[name])):
+                raise self.caller.error(self.where, f"{self.target.qualified}() gives {name} no value.")
         results = tuple(env[name] for name in self.outputs)
         if not results:
             return ()

@@ -83,7 +83,7 @@ class Lookup:
         if isinstance(node, Record):
             return self.field(node, name, where)
         if node is DISABLED:
-            raise self.error(where, f"{_written(where)} belongs to a component whose condition is false.")
+            raise self.error(where, f"{written(where)} belongs to a component whose condition is false.")
         if isinstance(node, Scope):
             if node.declares(name):
                 return node.component(name)
@@ -98,15 +98,15 @@ class Lookup:
                 return found
         if isinstance(node, Scope) and "expandable" in node.definition.prefixes:
             raise self.error(
-                where, f"{_written(where)}: expandable connectors are a limit of this exporter ({node.path})."
+                where, f"{written(where)}: expandable connectors are a limit of this exporter ({node.path})."
             )
         known = list(node.elements) if isinstance(node, Scope) else []
-        raise self.error(where, f"{_written(where)}: there is no {name}.{did_you_mean(name, known)}")
+        raise self.error(where, f"{written(where)}: there is no {name}.{did_you_mean(name, known)}")
 
     def _unknown(self, expression: Syntax, name: str) -> ModelicaError:
         known = [*self.scope.elements, *self.local]
         return self.error(
-            expression, f"the name {_written(expression)} is not known.{did_you_mean(name, known)}"
+            expression, f"the name {written(expression)} is not known.{did_you_mean(name, known)}"
         )
 
     def of_node(self, node: Any, where: Syntax) -> Value:
@@ -118,7 +118,7 @@ class Lookup:
         if isinstance(node, list):
             return [self.of_node(part, where) for part in node]
         if node is DISABLED:
-            raise self.error(where, f"{_written(where)} belongs to a component whose condition is false.")
+            raise self.error(where, f"{written(where)} belongs to a component whose condition is false.")
         if isinstance(node, Scope):
             if node.path is None:
                 if node.definition.literals:
@@ -127,7 +127,7 @@ class Lookup:
                     ]
                 if node.definition.kind == "function":
                     return Partial(node, {})
-                raise self.error(where, f"{_written(where)} is a class, not a value.")
+                raise self.error(where, f"{written(where)} is a class, not a value.")
             fields = {n: node.component(n) for n in node.elements if node.declares(n)}
             return Record(
                 node.qualified, {n: self.of_node(f, where) for n, f in fields.items() if f is not DISABLED}
@@ -140,7 +140,7 @@ class Lookup:
             return value
         first, rest = subscripts[0], subscripts[1:]
         if not isinstance(value, list):
-            raise self.error(where, f"{_written(where)} has more subscripts than dimensions.")
+            raise self.error(where, f"{written(where)} has more subscripts than dimensions.")
         if first.op == "colon":
             return [self.subscripted(v, rest, where) for v in value]
         self.ends.append(len(value))
@@ -158,7 +158,7 @@ class Lookup:
         if isinstance(index, bool):
             index = int(index) + 1
         if isinstance(index, Term) and (self.connecting or isinstance(value[0] if value else None, Scope)):
-            index = self.fixed(index, where, f"a subscript of {_written(where)}")  # which component it is
+            index = self.fixed(index, where, f"a subscript of {written(where)}")  # which component it is
         index = plain(index)
         if isinstance(index, Term):
             return self._variable_index(value, index, where)
@@ -166,14 +166,14 @@ class Lookup:
             index = int(index)
         if not isinstance(index, int) or not 1 <= index <= len(value):
             raise self.error(
-                where, f"the subscript {text(index)} of {_written(where)} is not in 1:{len(value)}."
+                where, f"the subscript {text(index)} of {written(where)} is not in 1:{len(value)}."
             )
         return value[index - 1]
 
     def _variable_index(self, value: list[Any], index: Term, where: Syntax) -> Value:
         values = [self.of_node(v, where) for v in value]
         if not values:
-            raise self.error(where, f"{_written(where)} is empty.")
+            raise self.error(where, f"{written(where)} is empty.")
         result = values[-1]
         for k in range(len(values) - 1, 0, -1):
             chosen = make("noEvent", make("<=", index, k))
@@ -189,7 +189,8 @@ class Lookup:
         return value.fields[name]
 
 
-def _written(expression: Syntax) -> str:
+def written(expression: Syntax) -> str:
+    """A name as it is written, for messages."""
     if expression.op == "name":
         return ".".join(part + ("[…]" if subscripts else "") for part, subscripts in expression.args)
     return "the expression"

@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from thsa_cosim.errors import ModelicaError
-from thsa_cosim.modelica.arrays import Record, Value, each, shape
+from thsa_cosim.modelica.arrays import UNSET, Record, Value, each, shape
 from thsa_cosim.modelica.evaluate import Evaluator
 from thsa_cosim.modelica.syntax import Equation, Syntax
 from thsa_cosim.modelica.terms import Scalar, Term, make
@@ -21,16 +21,6 @@ MOST_UNKNOWN = 200  # turns of a loop whose end is not known at export
 
 Env = dict[str, Value]  # values by name
 Step = Callable[[Env], "tuple[Env | None, list[_Exit]]"]
-
-
-class _Unset:
-    """A variable that has no value yet."""
-
-    def __repr__(self) -> str:
-        return "(no value)"
-
-
-UNSET = _Unset()
 
 
 class UnknownStepsError(ModelicaError):

@@ -2,14 +2,8 @@
 
 from thsa_cosim.errors import ScenarioError, did_you_mean
 from thsa_cosim.parameters import ParameterSpace
-from thsa_cosim.scenario.tune_schema import (
-    LOOP_METRICS,
-    TERMS,
-    LineTable,
-    ParetoTable,
-    SurfaceTable,
-    TuneTable,
-)
+from thsa_cosim.scenario.metrics_schema import LOOP_METRICS, TERMS
+from thsa_cosim.scenario.tune_schema import LineTable, ParetoTable, SurfaceTable, TuneTable
 
 
 def checked_pareto(table: TuneTable) -> ParetoTable | None:

@@ -11,6 +11,14 @@ from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import check
+from thsa_cosim.scenario.metrics_schema import (
+    LOOP_METRICS,
+    METRICS,
+    START_METRICS,
+    LoopTable,
+    RequirementTable,
+    StartTable,
+)
 from thsa_cosim.scenario.schema import SearchTable
 from thsa_cosim.scenario.system import open_model
 from thsa_cosim.scenario.tune_drawn import checked_line, checked_pareto, checked_surface
@@ -26,16 +34,7 @@ from thsa_cosim.scenario.tune_model import (
     TuneScenario,
 )
 from thsa_cosim.scenario.tune_profile import finished, profile_axis, read_profiles, with_command
-from thsa_cosim.scenario.tune_schema import (
-    LOOP_METRICS,
-    METRICS,
-    START_METRICS,
-    ConditionTable,
-    LoopTable,
-    RequirementTable,
-    StartTable,
-    TuneTable,
-)
+from thsa_cosim.scenario.tune_schema import ConditionTable, TuneTable
 from thsa_cosim.scenario.tune_uncertainty import read_uncertainty
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.system.description import SystemDescription
@@ -50,21 +49,8 @@ def resolve_tune(
     profiles = _profiles(table, fmu, read_profiles(path, table, fmu))
     command = profiles[0].command if profiles else _command(table, fmu)
     axes = tuple(_axis(name, axis, fmu, f"conditions.{name}") for name, axis in table.conditions.items())
-    driven: set[str | None] = {
-        command.input,
-        *(axis.name for axis in axes),
-        *(table.profile.columns if table.profile else ()),
-    }
+    _all_driven(table, fmu, command, axes)
     axes += profile_axis(len(profiles))
-    if table.loop is not None and _interval(table.loop, fmu) is not None:
-        driven.add(table.loop.disturbance)  # it is 0 but for the margins
-    for variable in fmu.inputs:
-        if variable.is_float and variable.name not in driven and not variable.may_stay_open:
-            raise ScenarioError(
-                f"conditions.{variable.name} is missing: input {variable.name!r} of {fmu.path.name} needs values."
-            )
-    if command.input in table.conditions:
-        raise ScenarioError(f"conditions.{command.input} is the command's input; remove it.")
     space = ParameterSpace(tuple(_gain(table, k, fmu) for k in range(len(table.parameters))))
     fixed = check.fixed(path, table, fmu, space)
     for name in table.conditions:
@@ -112,6 +98,24 @@ def resolve_tune(
         simulation=table.simulation,
         profiles=profiles,
     )
+
+
+def _all_driven(table: TuneTable, fmu: FmuDescription, command: CommandSpec, axes: Sequence[Axis]) -> None:
+    """Every input gets its values from one place."""
+    driven: set[str | None] = {
+        command.input,
+        *(axis.name for axis in axes),
+        *(table.profile.columns if table.profile else ()),
+    }
+    if table.loop is not None and _interval(table.loop, fmu) is not None:
+        driven.add(table.loop.disturbance)  # it is 0 but for the margins
+    for variable in fmu.inputs:
+        if variable.is_float and variable.name not in driven and not variable.may_stay_open:
+            raise ScenarioError(
+                f"conditions.{variable.name} is missing: input {variable.name!r} of {fmu.path.name} needs values."
+            )
+    if command.input in table.conditions:
+        raise ScenarioError(f"conditions.{command.input} is the command's input; remove it.")
 
 
 def _profiles(table: TuneTable, fmu: FmuDescription, recordings: Sequence[Recording]) -> tuple[Profile, ...]:

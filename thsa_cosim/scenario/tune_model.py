@@ -11,16 +11,18 @@ from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.inspection import Inspection, inspect
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario.schema import SearchTable, SimulationTable
-from thsa_cosim.scenario.tune_schema import (
+from thsa_cosim.scenario.metrics_schema import (
     ControlCostTable,
-    LineTable,
     LoopTable,
     MetricsTable,
-    ParetoTable,
     RequirementTable,
-    ScheduleTable,
     StartTable,
+)
+from thsa_cosim.scenario.schema import SearchTable, SimulationTable
+from thsa_cosim.scenario.tune_schema import (
+    LineTable,
+    ParetoTable,
+    ScheduleTable,
     SurfaceTable,
     TuneTable,
     UncertaintyTable,

@@ -19,8 +19,8 @@ from thsa_cosim.tune.start import start_terms
 
 if TYPE_CHECKING:  # workers import this module
     from thsa_cosim.scenario import TuneScenario
+    from thsa_cosim.scenario.metrics_schema import StartTable
     from thsa_cosim.scenario.tune_model import CommandSpec, LoopSpec
-    from thsa_cosim.scenario.tune_schema import StartTable
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from thsa_cosim.costs import first_reach
 from thsa_cosim.signals import Signals
 
 if TYPE_CHECKING:
-    from thsa_cosim.scenario.tune_schema import StartTable
+    from thsa_cosim.scenario.metrics_schema import StartTable
 
 MOVED = 1e-3
 """Share of the largest value below which the last one is rest: the signal then did not stay in motion."""

@@ -239,14 +239,14 @@ def test_wave_numbers_that_were_found_are_starts_and_a_shape_of_the_model_stays(
 
 
 def test_long_recordings_are_simulated_a_few_at_a_time(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(room, "_AT_ONCE", 2 * 8 * N + 7)
+    monkeypatch.setattr(room, "AT_ONCE", 2 * 8 * N + 7)
     bench = Linear()
     many = [candidate(parameter(n), key=f"{n}{k}") for k in range(2) for n in ("a", "b")] + [
         candidate(parameter("a"))
     ]
     assert len(proposed(*many, bench=bench)) == 5
     assert bench.batches == [2, 2, 1]
-    monkeypatch.setattr(room, "_AT_ONCE", 1)
+    monkeypatch.setattr(room, "AT_ONCE", 1)
     bench = Linear()
     proposed(*many[:2], bench=bench)
     assert bench.batches == [1, 1]

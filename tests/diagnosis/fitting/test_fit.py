@@ -13,7 +13,7 @@ from thsa_cosim.batch.runner import OnOutcome
 from thsa_cosim.costs.channels import Channel
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
-from thsa_cosim.diagnosis.fitting.trials import Trial
+from thsa_cosim.diagnosis.fitting.trials import Trial, by_means, note_on_means
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import Signals
@@ -91,6 +91,33 @@ def expected() -> tuple[np.ndarray, np.ndarray]:
         residual = (decay(dict(zip(FREE.names, x, strict=True))) - MEASURED["fit"]) / NOISE
         x = x - np.linalg.lstsq(jacobian, residual, rcond=None)[0]
     return x, np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+
+
+def test_a_batch_returns_no_more_residuals_than_memory_should_hold(monkeypatch: pytest.MonkeyPatch):
+    own = bench()
+    vectors = np.array([FREE.start + 0.1 * k for k in range(5)])
+    at_once = own.residuals(FREE, vectors, "fit")
+    batches: list[int] = []
+    run = Formula.run
+
+    def counted(self: Formula, jobs: Sequence[Job], on_outcome: OnOutcome | None = None) -> list[Outcome]:
+        batches.append(len(jobs))
+        return run(self, jobs, on_outcome)
+
+    monkeypatch.setattr(Formula, "run", counted)
+    monkeypatch.setattr("thsa_cosim.diagnosis.fitting.bench.AT_ONCE", 2 * 8 * TIME.size + 7)
+    np.testing.assert_array_equal(own.residuals(FREE, vectors, "fit"), at_once)  # type: ignore[arg-type]
+    assert batches == [2, 2, 1]
+
+
+def test_long_recordings_are_compared_by_means_which_the_diagnosis_says():
+    short = by_means([trial("fit"), trial("validate")], TIME.size)
+    assert note_on_means(short) == []
+    assert all(t.case.channels[0].fine is None for t in short)
+    long = by_means([trial("fit"), trial("validate")], TIME.size // 2)
+    assert {c.mean_of for t in long for c in t.case.channels} == {2 + TIME.size % 2}
+    (note,) = note_on_means(long)
+    assert f"means of {2 + TIME.size % 2} neighbouring samples" in note
 
 
 def test_it_finds_the_least_squares_and_its_standard_errors():

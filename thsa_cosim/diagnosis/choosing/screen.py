@@ -13,14 +13,12 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
-from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.bench import AT_ONCE, Bench
 from thsa_cosim.diagnosis.fitting.fit import RESPONSE, Fit
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 from thsa_cosim.signals import FloatArray
 
 _WANTED = 3.0 * RESPONSE
-_AT_ONCE = 2**29
-"""Bytes of residuals that are held before they become responses of half the size."""
 _ROWS = 100_000
 #: Left of a response after orthogonalisation (as a share of its square) below which nothing can be said.
 TESTABLE = 1e-6
@@ -155,7 +153,7 @@ def _in_batches(
     bench: Bench, unknowns: Unknowns, vectors: FloatArray, size: int
 ) -> Iterator[FloatArray | None]:
     """The residuals of each vector; of long recordings only as many at a time as memory should hold."""
-    count = max(1, _AT_ONCE // (8 * size))
+    count = max(1, AT_ONCE // (8 * size))
     for first in range(0, len(vectors), count):
         yield from bench.residuals(unknowns, vectors[first : first + count], "fit")
 

@@ -218,7 +218,7 @@ class _Plan:
     def _weighted(self, outputs: Signals) -> FloatArray:
         """(N,) all compared outputs in standard deviations of the noise, as the round weighed them."""
         parts = [
-            outputs[c.name] * (self._factor(c.name) * np.sqrt(c.weight) / c.noise)
+            outputs[c.name] * (self._factor(c.name) * np.sqrt(c.weight / c.mean_of) / c.noise)
             for c in self.fit[0].case.channels
         ]
         return np.concatenate(parts)
@@ -284,7 +284,7 @@ class _Plan:
     def _present(self, number: int, samples: int) -> float:
         """Distance to a rival on the fit recordings, scaled to ``samples`` of every output."""
         apart = (self.models[0].fit.residual - self.models[number].fit.residual) / self.one.factors
-        recorded = sum(t.case.channels[0].measured.size for t in self.fit)
+        recorded = sum(c.measured.size * c.mean_of for c in (t.case.channels[0] for t in self.fit))
         return float(apart @ apart) * samples / recorded
 
     def _sharpest(self, ran: Sequence[_Ran]) -> SeparatingExperiment | None:

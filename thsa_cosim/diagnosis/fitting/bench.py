@@ -60,6 +60,10 @@ class Fitted:
         return np.inf if residual is None else float(residual @ residual), np.zeros(0)
 
 
+#: Bytes of residuals that one batch of simulations returns: beside them there is at most one copy.
+AT_ONCE = 2**26
+
+
 class Bench:
     """Runs a model against the recordings; counts what it ran and what failed."""
 
@@ -103,11 +107,13 @@ class Bench:
 
         Simulated minus measured, in standard deviations of the noise, times the channel's factor.
         """
-        reply = self._ask(Want.RESIDUALS, self.of(part), unknowns, vectors)
-        if not self.weights:
-            return list(reply.residuals)
-        factors = self.factors(part)
-        return [None if residual is None else residual * factors for residual in reply.residuals]
+        trials, factors = self.of(part), self.factors(part)
+        count = max(1, AT_ONCE // (8 * factors.size))
+        found: list[FloatArray | None] = []
+        for first in range(0, len(vectors), count):
+            reply = self._ask(Want.RESIDUALS, trials, unknowns, vectors[first : first + count])
+            found += [None if residual is None else residual * factors for residual in reply.residuals]
+        return found
 
     def signals(self, unknowns: Unknowns, vector: FloatArray) -> dict[str, Signals | None]:
         """The simulated outputs of every recording, by experiment name; None where the run failed."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from thsa_cosim.scenario.tune_schema import METRICS
+from thsa_cosim.scenario.metrics_schema import METRICS
 from thsa_cosim.tune import Pareto, ScheduleResult, Scored, Surface, TuneResult
 from thsa_cosim.tune.combine import equation_7
 

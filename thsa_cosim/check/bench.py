@@ -1,0 +1,243 @@
+"""What the trials of an FMU share: its excitation, the worker processes, a first run that succeeds."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
+from thsa_cosim.batch.handling import HandlingTrial, try_input_handling
+from thsa_cosim.check import numerics
+from thsa_cosim.check.budget import LONGEST_RUN, SLOW_SHARES, Budget, is_slow
+from thsa_cosim.check.excitation import Excitation
+from thsa_cosim.check.finding import Finding, Verdict
+from thsa_cosim.fmu import FmuDescription, probe
+from thsa_cosim.fmu.inputs import is_ours
+from thsa_cosim.fmu.plant import Backend, Kind, Reuse
+from thsa_cosim.signals import FloatArray, Signals
+
+_WARM_UP = 10
+"""Cycles before memory is watched: interpreter and allocator settle."""
+_SHORT = 200
+"""Communication points of a run that is repeated to watch memory."""
+_CYCLES = 50
+_LONG = 3000
+_BY_INPUTS = (Status.NOT_FINITE, Status.FMI_ERROR, Status.FMI_DISCARD, Status.INCOMPLETE)
+"""How a run may fail because its inputs ask too much."""
+
+
+class Bench:
+    """Runs an FMU as a check does; ``first_outcome`` settles how."""
+
+    def __init__(
+        self,
+        description: FmuDescription,
+        excitation: Excitation,
+        deadline_s: float,
+        on_finding: Callable[[Finding], None] | None,
+    ) -> None:
+        self._description = description
+        self._given = excitation
+        self._values = dict(excitation.values)
+        self._time = excitation.communication_points(description)
+        self._inputs = self._excited()
+        self._deadline = deadline_s
+        self._on_finding = on_finding
+        self._outputs = probe.observed(description)
+        self._kind: Kind = excitation.kind or (
+            "co-simulation" if description.supports_co_simulation else "model-exchange"
+        )
+        self._mode = excitation.input_mode
+        self._handling: HandlingTrial | None = None
+        self._first = Signals(self._time, {})
+        self._halves = True
+        self._budget = Budget()
+        self._rests = False
+        self._slowness = ""
+        self._cut = False
+        self._changed = {
+            name: value
+            for name, value in probe.changed_parameters(description).items()
+            if name not in self._values
+        }
+        self.findings: list[Finding] = []
+
+    def _excited(
+        self, *, times: float = 1.0, only: str | None = None, time: FloatArray | None = None
+    ) -> Signals | None:
+        if self._given.inputs is not None:
+            return self._given.inputs
+        return probe.kinked_inputs(
+            self._description,
+            self._time if time is None else time,
+            ends=self._given.ends,
+            times=times,
+            only=only,
+        )
+
+    def _note(self, name: str, verdict: Verdict, text: str, **values: float) -> None:
+        finding = Finding(name, verdict, text, values)
+        self.findings.append(finding)
+        if self._on_finding is not None:
+            self._on_finding(finding)
+
+    def _take(self, name: str, judged: numerics.Judged) -> None:
+        verdict, text, values = judged
+        self._note(name, verdict, text, **values)
+
+    def _experiment(self, name: str, time: FloatArray, inputs: Signals | None = None) -> Experiment:
+        return Experiment(
+            name,
+            self._description.path,
+            inputs or self._inputs,
+            self._outputs,
+            time,
+            self._values,
+            tolerance=self._given.tolerance,
+            input_mode=self._mode if self._kind == "co-simulation" else None,
+        )
+
+    def _runner(
+        self,
+        reuse: Reuse = "fresh",
+        kind: Kind | None = None,
+        more: Sequence[Experiment] = (),
+        backend: Backend | Literal["auto"] | None = "auto",
+    ) -> LocalRunner:
+        """Open one worker process with "trial", "halved" and "doubled" (step), "short" (footprint) and ``more``."""
+        experiments = [
+            self._experiment("trial", self._time),
+            self._experiment("halved", probe.halved(self._time)),
+            self._experiment("doubled", self._time[::2] if len(self._time) > 2 else self._time),
+            replace(
+                self._experiment("short", self._time[: self._short_points()]),
+                reduce=probe.footprint,
+            ),
+            *more,
+        ]
+        return LocalRunner(
+            experiments,
+            deadline_s=self._deadline,
+            reuse=reuse,
+            kind=kind or self._kind,
+            # The same bits, and a process starts a second earlier than with machine code.
+            backend=("python" if len(self._time) < _LONG else None) if backend == "auto" else backend,
+            recycle_growth_mb=1e6,
+        )
+
+    def _short_runs(self, cycles: int) -> int:
+        return self._budget.runs(_WARM_UP + cycles, self._short_points())
+
+    def _short_points(self) -> int:
+        return self._budget.points_for(_WARM_UP + _CYCLES, min(len(self._time), _SHORT))
+
+    @property
+    def _is_free(self) -> bool:
+        """Whether nobody said how long to simulate."""
+        return self._given.time is None and self._given.duration is None
+
+    def first_outcome(self) -> tuple[Outcome, str]:
+        """The first run that succeeds, whole if possible, and what is to be said where it is not."""
+        whole = self._time
+        outcome = self._try()
+        reason, doubt = outcome.reason, ""
+        if outcome.status is Status.TIMEOUT and self._is_free:
+            outcome, doubt = self._cut_to_what_is_fast(outcome)
+        elif not outcome.ok and self._may_be_cut():
+            self._shorten(self._given.communication_points(self._description, cut=True))
+            outcome = self._try()
+            done = f"{np.ptp(self._time):g} s of {np.ptp(whole):g} s"
+            doubt = f"; only {done}, as it fails in longer steps ({reason})"
+        if not outcome.ok and self._given.kind is None and self._kind == "co-simulation":
+            self._shorten(whole)
+            outcome, doubt = self._fall_back(outcome)
+        if not outcome.ok and outcome.status in _BY_INPUTS:
+            outcome, doubt = self._at_rest(outcome)
+        return outcome, doubt
+
+    def _at_rest(self, failed: Outcome) -> tuple[Outcome, str]:
+        """Hold inputs of which nobody said where they run: does it fail because of them?"""
+        if self._given.inputs is not None or self._inputs is None or self._given.ends:
+            return failed, ""
+        moving, self._inputs = self._inputs, self._still()
+        outcome = self._try()
+        if outcome.ok:
+            self._rests = True
+            doubt = f"; with inputs that move it fails ({failed.reason}): say how far they run (--input NAME=VALUE)"
+            return outcome, doubt
+        self._inputs = moving
+        return replace(failed, reason=f"{failed.reason}; with its inputs at rest it fails, too"), ""
+
+    def _still(self) -> Signals:
+        assert self._inputs is not None
+        held = {n: np.full(len(self._time), v[0]) for n, v in self._inputs.values.items()}
+        return Signals(self._time, held)
+
+    def _shorten(self, time: FloatArray) -> None:
+        self._time = time
+        self._inputs = self._excited()
+
+    def _cut_to_what_is_fast(self, killed: Outcome) -> tuple[Outcome, str]:
+        """Run the begin of an experiment that outlasts the deadline, unless it hangs there."""
+        whole = self._time
+        for share in SLOW_SHARES:
+            points = max(int(share * len(whole)), 2)
+            self._shorten(whole[:points])
+            outcome = self._run_once()
+            if outcome.status is Status.TIMEOUT:
+                continue
+            if not outcome.ok or not is_slow(outcome.duration_s, share, self._deadline):
+                break
+            fast = int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))
+            self._shorten(whole[:fast])
+            self._cut = True
+            outcome = self._try()
+            done = f"{np.ptp(self._time):.3g} s of {np.ptp(whole):g} s"
+            return outcome, f"; only {done}: all of it takes more than {self._deadline:g} s (see --deadline)"
+        return killed, ""
+
+    def _try(self) -> Outcome:
+        """Run once; find out how inputs are to be given, and run so."""
+        outcome = self._run_once()
+        if outcome.ok and outcome.duration_s > LONGEST_RUN and self._is_free and not self._cut:
+            seconds, points = np.ptp(self._time), len(self._time)
+            self._shorten(self._time[: int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))])
+            self._slowness = (
+                f"; it took {outcome.duration_s:.3g} s, so what follows is tried over"
+                f" {np.ptp(self._time):.3g} s of {seconds:g} s"
+            )
+            outcome = self._run_once()
+        told = self._given.input_mode is not None or is_ours(self._description)
+        if told or not outcome.ok or self._kind != "co-simulation":
+            return outcome
+        self._handling = try_input_handling(
+            self._experiment("handling", self._time), deadline_s=self._deadline
+        )
+        best = self._handling.best
+        self._mode = None if best is None else best.mode
+        return self._run_once()
+
+    def _run_once(self) -> Outcome:
+        with self._runner() as runner:
+            return runner.run([Job("trial")])[0]
+
+    def _may_be_cut(self) -> bool:
+        given = self._given
+        return given.time is None and given.step is None and given.duration is None and self._was_coarsened()
+
+    def _was_coarsened(self) -> bool:
+        """Whether the steps are longer than what the FMU declares, so that the stop time is reached."""
+        declared = self._given.communication_points(self._description, cut=True)
+        return bool(self._time[1] - self._time[0] > 1.001 * (declared[1] - declared[0]))
+
+    def _fall_back(self, failed: Outcome) -> tuple[Outcome, str]:
+        """Try Model Exchange where Co-Simulation does not run."""
+        if not self._description.supports_model_exchange or self._description.fmi_version == "1.0":
+            return failed, ""
+        self._kind = "model-exchange"
+        outcome = self._try()
+        if not outcome.ok:
+            self._kind = "co-simulation"
+            return failed, ""
+        return outcome, f'; Co-Simulation fails ({failed.reason}): set interface = "model-exchange"'

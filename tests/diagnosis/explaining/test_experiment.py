@@ -189,7 +189,7 @@ def test_the_rival_may_be_the_true_one(monkeypatch: pytest.MonkeyPatch):
 
 def test_a_profile_that_settles_comes_before_a_larger_gap_that_does_not():
     settles, sure, large = (
-        room._worth(gap, wanted) for gap, wanted in ((30.0, 20.0), (90.0, 30.0), (400.0, 900.0))
+        room._worth(gap, wanted) for gap, wanted in ((70.0, 30.0), (90.0, 30.0), (400.0, 900.0))
     )
     assert sure > settles > large > room._worth(300.0, 900.0)
 

@@ -314,9 +314,9 @@ def _wanted(effect: float) -> float:
     return max(SIGMAS**2, APART_SHARE * effect)
 
 
-def _worth(gap: float, wanted: float) -> tuple[float, float]:
-    """Profiles that settle the tie come first, the surest ones ahead; of the others those with the largest gap."""
-    return (min(gap / wanted, SAFETY) if gap >= wanted else 0.0, gap)
+def _worth(gap: float, wanted: float) -> tuple[bool, float]:
+    """Profiles that settle the tie come first, and those with the larger gap."""
+    return gap >= SAFETY * wanted, gap
 
 
 def _moved(ran: _Ran, plan: _Plan) -> float:

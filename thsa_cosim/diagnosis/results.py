@@ -55,7 +55,7 @@ class KnownEffect:
 
 
 @dataclass(frozen=True)
-class FoundEffect(KnownEffect):
+class FoundEffect:
     """An effect that was added: its parameters, its equivalents in these recordings, and its probability."""
 
     name: str

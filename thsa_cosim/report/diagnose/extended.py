@@ -44,7 +44,7 @@ def write_extended_scenario(result: DiagnosisResult, folder: Path) -> Path | Non
         *(_declared(p, result.declared_after.get(p["name"])) for p in asked["parameters"]),
         *_coefficients(result, result.extended_fmu),
     ]
-    values = [v for e in (*result.known, *result.effects) for v in e.parameters.values()]
+    values = [v for _, parameters in _kept(result) for v in parameters.values()]
     asked["fixed"] = {**asked.get("fixed", {}), **{v.variable: v.value for v in values if v.role == "shape"}}
     path = folder / EXTENDED
     text = _HEADING.format(path=path, folder=folder) + "\n".join(_tables(asked, ()))
@@ -73,18 +73,24 @@ def _declared(parameter: Mapping[str, Any], found: Value | None) -> dict[str, An
     return own
 
 
+def _kept(result: DiagnosisResult) -> list[tuple[str, Mapping[str, Value]]]:
+    """Name and parameters of every effect in the model, known or found."""
+    known = [(e.name, e.parameters) for e in result.known]
+    return known + [(e.name, e.parameters) for e in result.effects]
+
+
 def _coefficients(result: DiagnosisResult, fmu: Path) -> Iterator[dict[str, Any]]:
     """The effects' coefficients; their shapes (wave numbers, speeds) stay as they were found."""
     variables = read_description(fmu).variables
-    for effect in (*result.known, *result.effects):
-        values = {n: v for n, v in effect.parameters.items() if v.role == "coefficient"}
+    for effect, parameters in _kept(result):
+        values = {n: v for n, v in parameters.items() if v.role == "coefficient"}
         sizes: dict[str, float] = {}
         for v in values.values():
             sizes[v.unit] = max(sizes.get(v.unit, 0.0), abs(v.value))
         for name, v in values.items():
             room, known = ROOM * (sizes[v.unit] or 1.0), variables[v.variable]
             yield {
-                "name": f"{effect.name}.{name}",
+                "name": f"{effect}.{name}",
                 "variable": v.variable,
                 "unit": v.unit,
                 "start": v.value,

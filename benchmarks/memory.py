@@ -134,9 +134,12 @@ def main() -> int:
             peaks.note(run.pid)
             time.sleep(EVERY_S)
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
-        result = json.loads((folder / "study" / "result.json").read_text(encoding="utf-8"))
-    named = [effect["name"] for effect in result["effects"]]
-    print(f"{options.minutes:g} min at 1 kHz: exit {run.returncode}, {result['verdict']}, {named}")
+        found = folder / "study" / "result.json"
+        result = json.loads(found.read_text(encoding="utf-8")) if found.exists() else {}
+    named = [effect["name"] for effect in result.get("effects", ())]
+    print(
+        f"{options.minutes:g} min at 1 kHz: exit {run.returncode}, {result.get('verdict', 'no result')}, {named}"
+    )
     print(f"{used.ru_utime + used.ru_stime:.0f} CPU s, {time.monotonic() - peaks.began:.0f} s wall")
     for name in ("whole", "parent", "worker"):
         size, when = getattr(peaks, name)

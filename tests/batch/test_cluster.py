@@ -20,8 +20,11 @@ from fmu_sources import build
 from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
 from thsa_cosim.batch.cluster import ClusterRunner
 from thsa_cosim.errors import MissingExtraError, StudyError
+from thsa_cosim.fmu.description import DefaultExperiment
 from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.system.assemble import Part, Wire, assemble
+from thsa_cosim.system.write import write_ssp
 
 pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
 
@@ -90,6 +93,23 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+
+
+@pytest.mark.slow
+def test_a_system_travels_with_all_of_its_fmus(cluster: Cluster, tmp_path: Path) -> None:
+    parts = [Part("first", build.lag2(), "coupled", 0.01), Part("second", build.lag3(), "coupled", 0.01)]
+    system, archives = assemble("chain", parts, [Wire("first.y", "second.u")], {"u": ["first.u"]})
+    path = write_ssp(system, archives, tmp_path / "here only" / "chain.ssp", DefaultExperiment(0.0, 1.0))
+    chain = Experiment("chain", path, INPUTS, ("second.y",), TIME)
+    jobs = [Job("chain", {"first.tau": tau}, keep_signals=True) for tau in (0.05, 0.1)]
+    with LocalRunner([chain], workers=1) as runner:
+        local = runner.run(jobs)
+    with ClusterRunner([chain], cluster.address, timeout_s=60.0) as remote:
+        found = remote.run(jobs)
+    for mine, theirs in zip(local, found, strict=True):
+        assert mine.signals is not None
+        assert theirs.signals is not None, theirs.reason
+        assert np.array_equal(mine.signals["second.y"], theirs.signals["second.y"])
 
 
 @pytest.mark.slow

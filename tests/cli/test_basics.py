@@ -29,6 +29,26 @@ def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[st
     )
 
 
+def test_the_package_runs_as_the_command() -> None:
+    """Where scripts are not on the PATH, as often on Windows."""
+    done = subprocess.run(
+        [sys.executable, "-m", "thsa_cosim", "--version"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (0, run("--version").stdout)
+
+
+def test_an_empty_folder_has_no_study_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run_command(["list", str(tmp_path)]) == 0
+    assert (
+        capsys.readouterr().out
+        == f"No study in {tmp_path} or below; name the folder that holds your studies.\n"
+    )
+
+
 def outcome(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str]:
     """Exit code and stderr of a command line, in this process."""
     code = cli.run_command([str(a) for a in arguments])

@@ -174,6 +174,16 @@ def test_a_recording_that_begins_in_motion_or_gets_warm_is_named() -> None:
     assert [(f.channel, f.kind) for f in found(table)] == [("temperature_degC", "temperature-drift")]
 
 
+def test_kelvin_called_celsius_is_named() -> None:
+    table = load("motor_m30")
+    table["temperature_degC"] += 273.15
+    assert [(f.channel, f.kind) for f in found(table)] == [("temperature_degC", "unit")]
+    time, noise = np.arange(500) * 1e-2, np.random.default_rng(1).normal(0.0, 0.2, 500)
+    called_kelvin = Channel("run", "T", "K", "input", time, 20.0 + noise)
+    (finding,) = [f for f in inspect_channels("run", [called_kelvin], [time]) if f.kind == "unit"]
+    assert 'unit = "degC"' in finding.remedy
+
+
 def test_a_signal_that_is_rectified_is_clipped() -> None:
     table = load("motor_p25")
     table["q_current_A"] = table["q_current_A"].clip(lower=0.0)

@@ -349,3 +349,12 @@ def test_an_angle_that_wraps_is_unwrapped_by_consent(tmp_path):
     assert np.ptp(plain.signals["phi"]) < 2.0 * np.pi
     np.testing.assert_allclose(found.signals["phi"], np.radians(angle), atol=1e-9)
     assert found.repairs == ("phi: unwrapped 3 times by 360 of the file's numbers",)
+
+
+def test_decimal_signs_that_change_within_a_file_are_refused(tmp_path):
+    rows = ["time;speed", *(f"{k / 1000:.3f};{k * 0.5:.2f}" for k in range(100))]
+    rows[40:] = [row.replace(".", ",") for row in rows[40:]]
+    path = tmp_path / "mixed.csv"
+    path.write_text("\n".join(rows))
+    with pytest.raises(RecordingError, match=r"row 41 have the decimal sign '\.', those from there on ','"):
+        column_names(path)

@@ -29,6 +29,7 @@ def result(**more: Any) -> Any:
     whole = {
         "extended_fmu": ROOT / "fmus" / "Servo.fmu",
         "effects": (effect,),
+        "known": (),
         "asked": asked,
         "scenario": ROOT / "scenarios" / "servo.toml",
         "title": 'A "servo"',
@@ -58,6 +59,24 @@ def test_it_can_be_loaded_with_the_found_values_as_starts(tmp_path: Path) -> Non
     assert (coefficient.lower, coefficient.upper) == (0.0, 2.0), (
         "five times as large, as far as the FMU allows"
     )
+
+
+def test_a_known_effect_is_identified_again_like_one_that_was_found(tmp_path: Path) -> None:
+    parameters = {
+        "c": Value(0.3, "N.m", 0.01, variable="T_c"),
+        "v_S": Value(0.2, "kg", 0.0, variable="m", role="shape"),
+    }
+    spring = SimpleNamespace(name="spring:gear", parameters=parameters)
+    found = SimpleNamespace(
+        name="windage:gear", parameters={"b_q": Value(0.1, "N.m.s/rad", 0.01, variable="b")}
+    )
+    path = write_extended_scenario(result(known=(spring,), effects=(found,)), tmp_path)
+    assert path is not None
+    content = tomllib.loads(path.read_text())
+    starts = {p["name"]: p.get("start") for p in content["parameters"]}
+    assert (starts["spring:gear.c"], starts["windage:gear.b_q"]) == (0.3, 0.1)
+    assert content["fixed"]["m"] == 0.2
+    assert content["title"] == 'A "servo", with windage:gear'
 
 
 @pytest.mark.parametrize("lacks", [{"extended_fmu": None}, {"effects": ()}, {"asked": {}}])

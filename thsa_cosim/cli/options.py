@@ -105,8 +105,10 @@ class StudyOptions:
             done.show(out)
             if note:
                 out.print(note, highlight=False, markup=False, soft_wrap=True)
+            page = done.folder / "report.html"
+            shown = f"; open {page}" if page.exists() else ""
             out.print(
-                f"\n{len(set(done.files))} files in {done.folder}; the numbers are in {result}",
+                f"\n{len(set(done.files))} files in {done.folder}{shown}; the numbers are in {result}",
                 soft_wrap=True,
             )
         if done.objection:

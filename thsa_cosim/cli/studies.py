@@ -25,7 +25,7 @@ def list_command(folder: Path | None, as_json: bool) -> None:
     elif found:
         print_list(console(), found)
     else:
-        click.echo(f"no study in {place}")
+        click.echo(f"No study in {place} or below; name the folder that holds your studies.")
 
 
 @click.command(short_help="Compare studies: parameters, effects, errors.")

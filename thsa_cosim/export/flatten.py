@@ -161,8 +161,24 @@ def _find(model: str, package: Path, libraries: Sequence[Path]) -> tuple[Library
             f"{package}: is no Modelica package (no package.mo); give its folder with --package, or --library."
             f"{did_you_mean_path(package)}"
         )
+    raise ModelicaError(_not_found(library, search, names))
+
+
+def _not_found(library: Library, search: list[Path], names: list[str]) -> str:
+    """What is missing: a class in the innermost package that exists, or its library."""
+    for name in reversed(names):
+        parts = name.split(".")
+        for depth in range(len(parts) - 1, 0, -1):
+            around = library.find(".".join(parts[:depth]))
+            if around is not None and (depth > 1 or len(parts) == 2):
+                hint = did_you_mean(parts[depth], library.children(around))
+                return f"{around.file}: {'.'.join(parts[:depth])} holds no class {parts[depth]!r}.{hint}"
+    model = names[-1]
     known = [n for top in library.names() for n in _known(library, top)]
-    raise ModelicaError(f"{search[0]}: holds no class {model!r}.{did_you_mean(names[0], known)}")
+    hint = did_you_mean(names[0], known)
+    if "." in model and not hint:
+        hint = " Add the folder of its library with --library, or to MODELICAPATH."
+    return f"{search[0]}: holds no class {model!r}.{hint}"
 
 
 def _known(library: Library, top: str) -> list[str]:

@@ -179,6 +179,18 @@ class ApartInstance(Instance):
         """Go from ``time`` to ``time + step`` [s]."""
         self.ask("do_step", time, step)
 
+    def save_state(self, state: int = 0) -> int:
+        """Save the FMU's state; its address is one of the other process."""
+        return int(self.ask("save_state", state))
+
+    def restore_state(self, state: int) -> None:
+        """Go back to a saved state."""
+        self.ask("restore_state", state)
+
+    def free_state(self, state: int) -> None:
+        """Forget a saved state."""
+        self.ask("free_state", state)
+
     def directional_derivative(
         self, unknowns: NDArray[np.uint32], known: NDArray[np.uint32], out: FloatArray
     ) -> None:

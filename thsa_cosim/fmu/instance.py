@@ -230,6 +230,26 @@ class Instance(ABC):
             raise SimulationFailure(Status.LOAD_ERROR, reason)
         self.handle = handle
 
+    # -- going back ----------------------------------------------------------------------------------
+    def save_state(self, state: int = 0) -> int:
+        """Save the FMU's state, over ``state`` if that is one from before; return its address."""
+        held = ctypes.c_void_p(state or None)
+        self.call(f"Get{self._state}", (ctypes.c_void_p, ctypes.addressof(held)))
+        return held.value or 0
+
+    def restore_state(self, state: int) -> None:
+        """Go back to a saved state."""
+        self.call(f"Set{self._state}", (ctypes.c_void_p, state))
+
+    def free_state(self, state: int) -> None:
+        """Forget a saved state."""
+        held = ctypes.c_void_p(state)
+        self.call(f"Free{self._state}", (ctypes.c_void_p, ctypes.addressof(held)))
+
+    @property
+    def _state(self) -> str:
+        return "FMUState" if self.prefix == "fmi3" else "FMUstate"
+
     # -- Model Exchange ------------------------------------------------------------------------------
     def set_time(self, time: float) -> None:
         """Set the independent variable [s]."""

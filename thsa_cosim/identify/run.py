@@ -12,6 +12,7 @@ from thsa_cosim.batch import Journal
 from thsa_cosim.errors import InputError, StudyError
 from thsa_cosim.identify.expected import expected_values
 from thsa_cosim.identify.force import force_balance
+from thsa_cosim.identify.off_law import off_law
 from thsa_cosim.identify.over_temperature import all_laws, values_at
 from thsa_cosim.identify.parameter_set import parameter_set
 from thsa_cosim.identify.point import PointSearch, search_point
@@ -254,7 +255,7 @@ class _Search:
             if found.result is None
         ]
         force, unsaid = self._force(comparisons, laws)
-        slips = self._slips()
+        slips = [*self._slips(), *self._labels(laws)]
         return IdentifyResult(
             title=title,
             status="interrupted" if self.interrupted else "complete",
@@ -304,6 +305,21 @@ class _Search:
             doubted = {f.channel for f in slips}
             found += slips + [f for f in hidden_gains(residuals, expected) if f.channel not in doubted]
         return [f for f in found if (f.recording, f.channel, f.kind) not in known]
+
+    def _labels(self, laws: Mapping[str, LawResult]) -> list[Finding]:
+        """Recordings whose temperature seems to be another one, by the laws through all points."""
+        found = off_law(self._results(), laws)
+        if found is None:
+            return []
+        text, temperatures = found
+        table = self._scenario.table.temperature
+        channel = "time" if table is None or table.input is None else table.input
+        return [
+            Finding(case.name, channel, "temperature-label", "warning", text)
+            for point in self._points
+            for case in point.cases
+            if point.temperature_degC in temperatures
+        ]
 
     def _expected(self, index: int) -> list[Expected]:
         """What was identified at a point beside what the drawing says; empty without a Jacobian."""

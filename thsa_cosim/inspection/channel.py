@@ -27,7 +27,7 @@ _TURNING = 0.5
 _MOST_SPANS = 40
 _STRAIGHT, _DRAWN = 1e-6, 0.95
 """Bend in shares of the range that is rounding, and share of such samples that make a signal a schedule."""
-_JUMP, _OFTEN = 0.02, 0.15
+_JUMP, _OFTEN = 0.02, 0.05
 """Change of a command from sample to sample, in shares of its range, that is a jump; share of samples that are none."""
 _ANSWER = 4.5
 """Samples after a jump of a command that may stand out: a voltage at a step of the speed."""

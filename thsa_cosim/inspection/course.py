@@ -15,6 +15,8 @@ from thsa_cosim.units import convert, same_dimension
 
 _WARM_NOTE, _WARM = 1.0, 2.5
 """K over a recording that are worth a note, a warning."""
+_TOO_HOT, _TOO_COLD, _ZERO_CELSIUS = 205.0, -150.0, 273.15
+"""degC that neither windings nor magnets nor grease of a drive reach: 205 degC are -68 degC in K."""
 _WINDOWS = 16
 _LEAST_SHARE = 1e-5
 """Noise in shares of the range, below which there is no sensor's."""
@@ -112,6 +114,25 @@ def temperature_drift(channel: Channel) -> Iterator[Finding]:
     severity: Severity = "warning" if change > _WARM else "note"
     text = f"{channel.name} goes from {parts[0]:.4g} degC to {parts[-1]:.4g} degC, over {change:.2g} K in all"
     yield channel.finding("temperature-drift", severity, text)
+
+
+def temperature_unit(channel: Channel) -> Iterator[Finding]:
+    """Kelvin called degrees Celsius, or the other way round: what no drive survives, where the other is usual."""
+    try:
+        if channel.unit in ("", "1") or not same_dimension(channel.unit, "K"):
+            return
+        celsius = float(np.median(np.asarray(convert(channel.plain, channel.unit, "degC"))))
+    except UnitError:
+        return
+    if _TOO_HOT < celsius < _TOO_HOT + 150.0:
+        meant, other = "K", celsius - _ZERO_CELSIUS
+    elif celsius < _TOO_COLD and celsius + _ZERO_CELSIUS > -100.0:
+        meant, other = "degC", celsius + _ZERO_CELSIUS
+    else:
+        return
+    text = f"{channel.name} is {celsius:.4g} degC; in {meant} its numbers would be {other:.4g} degC: is that its unit?"
+    remedy = f'[recordings.columns.{channel.name}]\nunit = "{meant}"'
+    yield channel.finding("unit", "warning", text, (), remedy)
 
 
 def moving_start(channel: Channel) -> Iterator[Finding]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from thsa_cosim.inspection.across import across_findings
 from thsa_cosim.inspection.channel import Channel
-from thsa_cosim.inspection.course import moving_start, temperature_drift, unequal_noise
+from thsa_cosim.inspection.course import moving_start, temperature_drift, temperature_unit, unequal_noise
 from thsa_cosim.inspection.finding import Finding, Inspection
 from thsa_cosim.inspection.jumps import jump_times, jumps
 from thsa_cosim.inspection.levels import dead_band, stuck_bit
@@ -35,6 +35,7 @@ CHANNEL_DETECTORS: tuple[Callable[[Channel], Iterator[Finding]], ...] = (
     hum,
     unequal_noise,
     temperature_drift,
+    temperature_unit,
     moving_start,
 )
 _OF_WRAPS = ("spikes", "dropouts", "interpolated-samples", "held-samples", "unequal-noise", "clipped")

@@ -35,6 +35,8 @@ _NUMBER = {
 }
 _MOST_WORDS = 20
 """Lines of words under a table."""
+_MOST_NUMBERED = 3
+"""Rows of numbers above a table from which on they are no names."""
 _HALF_DAY = re.compile(r"\s*([aApP])\.?[mM]\.?$")
 _STAMP = re.compile(r"(\d{4}-\d\d-\d\d|\d{1,2}[./]\d{1,2}[./]\d{2,4})([ T]+\d{1,2}:\d\d.*)?|\d+:\d\d:\d\d.*")
 _DAY = re.compile(r"(\d{1,2})[./](\d{1,2})[./](\d{4}|\d\d)(?:[ T]+(.*))?")
@@ -192,6 +194,12 @@ def _find_header(path: Path, lines: Sequence[str], offset: int, dialect: _Dialec
             above.append(cells)
     if first == len(lines):
         raise RecordingError(f"{path}: holds a header but no rows of numbers.")
+    other = "." if decimal == "," else ","
+    if sum(_are_numbers(cells, other) for cells in above) >= _MOST_NUMBERED:
+        raise RecordingError(
+            f"{path}: rows above row {first + 1} have the decimal sign {other!r}, those from there on {decimal!r};"
+            " export it with one of them."
+        )
     units = above.pop() if len(above) > 1 and _are_units(above[-1], decimal) else []
     header = above[-1] if above else [f"column {k + 1}" for k in range(width)]
     return _Layout(delimiter, decimal, width, header, [_bare(unit) for unit in units], first)
@@ -204,6 +212,12 @@ def _is_data(cells: Sequence[str], dialect: _Dialect) -> bool:
     plain = any(numbers) and all(n or b for n, b in zip(numbers, blank, strict=True))
     leading = dialect.leading < len(cells) and numbers[dialect.leading]
     return (plain or leading) and not _are_units(cells, dialect.decimal)
+
+
+def _are_numbers(cells: Sequence[str], decimal: str) -> bool:
+    """Return whether a row holds nothing but numbers with this decimal sign, and it at least once."""
+    filled = [cell for cell in cells if cell.lower() not in _SPECIAL]
+    return any(decimal in cell for cell in filled) and all(_is_number(cell, decimal) for cell in filled)
 
 
 def _bare(unit: str) -> str:

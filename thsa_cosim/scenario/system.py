@@ -51,7 +51,7 @@ def assemble_tables(path: Path, table: ModelTable) -> SystemDescription:
         for c in table.connections
     ]
     pins = {name: [given] if isinstance(given, str) else given for name, given in table.connectors.items()}
-    return assembled(path.stem, parts, wires, pins)
+    return assembled(path.stem, parts, wires, pins, table.coupling_tolerance)
 
 
 def _compiled(description: FmuDescription, table: ModelTable) -> FmuDescription:

@@ -63,6 +63,11 @@ class ModelTable(Table):
     connectors: dict[Name, Name | list[Name]] = Field(default_factory=dict)
     """Short names for variables of components: ``v = "plant.v"``; one name may drive several inputs."""
 
+    coupling_tolerance: Positive | None = None
+    """Error that communication steps may leave in any output of a component over a run, as a share of its largest size:
+    ``step`` is then the longest step, and steps are repeated shorter where it is exceeded. All components have to be
+    ``coupled`` by the same step, and able to go back to a former state (``canGetAndSetFMUstate``)."""
+
     merge: bool = True
     """Compile a system whose components are all FMUs of ``thsa-cosim export`` into one FMU, which runs some ten
     times faster; false: couple them at run time, as a system with other FMUs always is."""
@@ -73,6 +78,7 @@ class ModelTable(Table):
             raise PydanticCustomError("model", "fmu and components exclude each other; remove one")
         if not self.fmu and not self.components:
             raise PydanticCustomError("model", "fmu: is missing; add it, or [[components]] of a system")
-        if not self.components and (self.connections or self.connectors):
-            raise PydanticCustomError("model", "connections and connectors need [[components]]; add them")
+        if not self.components and (self.connections or self.connectors or self.coupling_tolerance):
+            what = "connections, connectors and coupling_tolerance need [[components]]; add them"
+            raise PydanticCustomError("model", what)
         return self

@@ -54,7 +54,11 @@ class Wire:
 
 
 def assemble(
-    name: str, parts: Sequence[Part], wires: Sequence[Wire], connectors: Mapping[str, Sequence[str]]
+    name: str,
+    parts: Sequence[Part],
+    wires: Sequence[Wire],
+    connectors: Mapping[str, Sequence[str]],
+    coupling_tolerance: float | None = None,
 ) -> tuple[System, dict[str, bytes]]:
     """Return the checked system and the archives of its components by source.
 
@@ -93,7 +97,14 @@ def assemble(
     outside = [
         _connector(shown, [_pin(pin, names) for pin in pins], by_name) for shown, pins in connectors.items()
     ]
-    return checked(System(name, tuple(components), tuple(links), tuple(outside))), archives
+    made = System(
+        name,
+        tuple(components),
+        tuple(links),
+        tuple(outside),
+        coupling_tolerance=coupling_tolerance,
+    )
+    return checked(made), archives
 
 
 def _pin(text: str, names: Sequence[str]) -> tuple[str, str]:
@@ -120,10 +131,14 @@ def system_folder() -> Path:
 
 
 def assembled(
-    name: str, parts: Sequence[Part], wires: Sequence[Wire], connectors: Mapping[str, Sequence[str]]
+    name: str,
+    parts: Sequence[Part],
+    wires: Sequence[Wire],
+    connectors: Mapping[str, Sequence[str]],
+    coupling_tolerance: float | None = None,
 ) -> SystemDescription:
     """Write the system as an archive into the user's cache folder, named after its content, and describe it."""
-    system, archives = assemble(name, parts, wires, connectors)
+    system, archives = assemble(name, parts, wires, connectors, coupling_tolerance)
     folder = system_folder()
     stops = [c.fmu.default_experiment.stop for c in system.components if c.fmu.default_experiment.stop]
     experiment = DefaultExperiment(0.0, max(stops, default=None))

@@ -90,6 +90,7 @@ class Nested:
     bindings: tuple[Binding, ...] = ()
     dictionaries: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """Signal dictionaries that it defines: units of their signals."""
+    coupling_tolerance: float | None = None
 
 
 @dataclass(frozen=True)
@@ -169,7 +170,14 @@ class _Flat:
         connectors = [self._taking(node, ways) for node, ways in takers.items()]
         connectors += self._shown()
         parts = [replace(c, start=placement.starts.get(c.name, {})) for c in self._components.values()]
-        made = System(self._nested.name, tuple(parts), tuple(connections), tuple(connectors))
+        tolerance = self._nested.coupling_tolerance
+        made = System(
+            self._nested.name,
+            tuple(parts),
+            tuple(connections),
+            tuple(connectors),
+            coupling_tolerance=tolerance,
+        )
         return replace(checked(made), notes=tuple(placement.notes))
 
     def _taking(self, node: _Node, ways: Sequence[_Way]) -> Connector:

@@ -21,6 +21,7 @@ from thsa_cosim.fmu.instance import Channel, EventInfo, Instance
 from thsa_cosim.fmu.native import Messages, MessageSink
 from thsa_cosim.fmu.point import Point
 from thsa_cosim.signals import FloatArray
+from thsa_cosim.system.adaptive import Adaptive
 from thsa_cosim.system.description import DISTURBANCE, SystemDescription
 from thsa_cosim.system.member import crowded, member, named, own_processes
 from thsa_cosim.system.stepped import Stepped
@@ -78,6 +79,8 @@ class SystemInstance(Instance):
         # At one instant, what has to catch up with it goes first, then what samples there.
         order = sorted(self._others, key=lambda c: c.execution == "sampled")
         self._stepped = [Stepped(c, self.parts[c.name], self._wiring, self._driven(c.name)) for c in order]
+        tolerance = self._system.coupling_tolerance
+        self._adaptive = tolerance and Adaptive(self._stepped, self._wiring, tolerance)
         self._time = 0.0
         self._ports: dict[tuple[str, str], Port] = {}
         self._disturbed = {".".join(pin): k for k, pin in enumerate(self._wiring.targets)}
@@ -96,10 +99,10 @@ class SystemInstance(Instance):
                 with named(component.name):
                     self.parts[component.name].instantiate()
         except SimulationFailure as failure:
-            lonely = [n for n, part in self.parts.items() if part.handle]
+            beside = [n for n, part in self.parts.items() if part.handle]
             self.free()
             name = component.name
-            if failure.status != Status.LOAD_ERROR or name in self._apart or not lonely:
+            if failure.status != Status.LOAD_ERROR or name in self._apart or not beside:
                 raise
             self._apart.add(name)
             self._build()
@@ -155,6 +158,8 @@ class SystemInstance(Instance):
         for stepped in self._stepped:
             stepped.begin(self._time)
             stepped.put(self._time)
+        if self._adaptive:
+            self._adaptive.begin(self._time, self._others[0].step or 0.0)
 
     def terminate(self) -> None:
         """End the run in every component."""
@@ -170,6 +175,8 @@ class SystemInstance(Instance):
 
     def free(self) -> None:
         """Destroy every instance that lives."""
+        if self._adaptive:
+            self._adaptive.release()
         for part in self.parts.values():
             part.free()
         self.handle = 0
@@ -293,6 +300,13 @@ class SystemInstance(Instance):
 
     def _act(self) -> None:
         """Step what is due, in the order of the components, each seeing what the ones before it have found."""
+        if self._adaptive:
+            step = self._others[0].step or 0.0
+            if self._time >= self._stepped[0].next_time - 1e-9 * step:
+                self._adaptive.cover(self._time, step)
+                for stepped in self._stepped:
+                    stepped.covered()
+            return
         acted = []
         for stepped in self._stepped:
             self.propagate(events=True)

@@ -191,6 +191,7 @@ def _system(
         connectors=_connectors(element),
         bindings=_bindings(path, archive, element, member),
         dictionaries=_dictionaries(path, archive, element, member),
+        coupling_tolerance=_float(_own(element, "Coupling").get("tolerance")),
     )
 
 

@@ -50,28 +50,30 @@ class Stepped:
         )
         """Present values of ``driven``."""
         self._ticks = 0
-        self._start = self._since = 0.0
-        self._before = np.zeros(len(names) + len(driven))
-        self._now = np.zeros(len(self._sources))
-        self._slope = np.zeros(len(self._sources))
+        self.is_first = True
+        self._start = self.since = 0.0
+        self.before = np.zeros(len(names) + len(driven))
+        self.now = np.zeros(len(self._sources))
+        self.slope = np.zeros(len(self._sources))
         self._waiting: tuple[float, FloatArray] | None = None
         self._late = np.random.default_rng(0)
         self._tick = 0.0
 
     def begin(self, time: float) -> None:
         """Take the state after initialisation."""
-        self._start = self._since = time
+        self._start = self.since = time
         self._ticks = 0 if self.component.execution == "sampled" else 1
         self._waiting = None
-        self._slope[:] = 0.0
+        self.is_first = True
+        self.slope[:] = 0.0
         self._late = np.random.default_rng(zlib.crc32(self.component.name.encode()))
         self._tick = self._next_tick()
-        self._now = self._read()
-        self._before = self._present()
+        self.now = self._read()
+        self.before = self._present()
 
     def put(self, time: float) -> None:
         """Put the outputs at ``time`` into the wiring's values."""
-        self._wiring.values[self._sources] = self._now + self._slope * (time - self._since)
+        self._wiring.values[self._sources] = self.now + self.slope * (time - self.since)
 
     @property
     def next_time(self) -> float:
@@ -88,7 +90,7 @@ class Stepped:
         if time < self.next_time - _TIME * self._step:
             return False
         if self._waiting is not None and time >= self._waiting[0] - _TIME * self._step:
-            self._now, self._waiting = self._waiting[1], None
+            self.now, self._waiting = self._waiting[1], None
         if time >= self._tick - _TIME * self._step:
             (self._sample if self.component.execution == "sampled" else self._follow)(time)
             self._tick = self._next_tick()
@@ -96,28 +98,55 @@ class Stepped:
 
     def _sample(self, time: float) -> None:
         self._inputs.write(self._present())
-        self._do_step(self._start + self._ticks * self._step)
+        self.instance.do_step(self._start + self._ticks * self._step, self._step)
         self._ticks += 1
         found = self._read()
         if self.component.delay > 0.0:
             self._waiting = (time + self.component.delay, found)
         else:
-            self._now = found
+            self.now = found
 
     def _follow(self, time: float) -> None:
+        self.follow(self._start + (self._ticks - 1) * self._step, self._step, time)
+        self._ticks += 1
+
+    def follow(self, begin: float, step: float, end: float | None = None) -> None:
+        """Step from ``begin`` with the mean of the inputs at both ends; at ``end`` (``begin + step``) all is known."""
         present = self._present()
-        self._inputs.write(np.where(self._floats, 0.5 * (self._before + present), self._before))
-        self._do_step(self._start + (self._ticks - 1) * self._step)
+        self._inputs.write(np.where(self._floats, 0.5 * (self.before + present), self.before))
+        self.instance.do_step(begin, step)
         self._inputs.write(present)  # outputs belong to the inputs here, also under direct feed-through
         found = self._read()
-        is_first = self._ticks == 1
-        self._slope = np.zeros_like(found) if is_first else (found - self._now) / self._step
-        self._now, self._since = found, time
+        self.slope = np.zeros_like(found) if self.is_first else (found - self.now) / step
+        self.now, self.since = found, begin + step if end is None else end
+        self.is_first = False
+
+    def refresh(self, step: float) -> None:
+        """Read the outputs again, with the inputs that the others have found meanwhile (direct feed-through)."""
+        self._inputs.write(self._present())
+        found = self._read()
+        self.slope = self.slope + (found - self.now) / step if not self.is_first else self.slope
+        self.now = found
+
+    def covered(self) -> None:
+        """Count a tick up to which somebody else has taken the component."""
         self._ticks += 1
+        self._tick = self._next_tick()
+
+    @property
+    def before_outside(self) -> FloatArray:
+        """Inputs from outside the system when it last settled."""
+        return self.before[len(self.before) - len(self._driven) :].copy()
+
+    def between(self, first: FloatArray, last: FloatArray, share: float) -> FloatArray:
+        """Inputs from outside at a ``share`` of the way; what is no float keeps its value until the end."""
+        floats = self._floats[len(self._floats) - len(self._driven) :]
+        held = last if share >= 1.0 - 1e-9 else first
+        return np.where(floats, first + share * (last - first), held)
 
     def settle(self) -> None:
         """Remember the inputs at this point, once everything that is due has acted."""
-        self._before = self._present()
+        self.before = self._present()
 
     def _present(self) -> FloatArray:
         return np.concatenate((self._wiring.inputs()[self._targets], self.outside))
@@ -126,9 +155,6 @@ class Stepped:
         found = np.empty(len(self._sources))
         self._outputs.read(found)
         return found
-
-    def _do_step(self, begin: float) -> None:
-        self.instance.do_step(begin, self._step)
 
     def drive(self, variable: str, value: float) -> bool:
         """Take a value for an input from outside the system; False if the variable is none of them."""

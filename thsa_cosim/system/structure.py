@@ -81,6 +81,9 @@ class System:
     connectors: tuple[Connector, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
     """What reading it left out, each in a sentence."""
+    coupling_tolerance: float | None = None
+    """Communication steps become as short as this needs: the error that they leave in any output over a run,
+    as a share of its largest size. None: every component keeps its ``step``."""
 
     def component(self, name: str) -> Component:
         """Return a component; FmuError if there is none of that name."""
@@ -131,6 +134,7 @@ def checked(system: System) -> System:
     _unique([c.name for c in system.connectors], "connector")
     for component in system.components:
         _check_component(component)
+    _check_rollback(system)
     writers: dict[tuple[str, str], str] = {}
     connections = []
     for connection in system.connections:
@@ -224,6 +228,11 @@ def _check_component(component: Component) -> None:
     fmu, name = component.fmu, component.name
     if fmu.fmi_version == "1.0":
         raise FmuError(f"component {name!r}: {fmu.path.name} is FMI 1.0; a system takes FMI 2.0 and 3.0.")
+    if timed := [clock.name for clock in fmu.clocks if clock.is_timed]:
+        raise FmuError(
+            f"component {name!r}: {fmu.path.name} has clocks that the importer has to tick ({', '.join(timed)}), "
+            "which a system does not do; export it without clocks and give it execution = 'sampled' with a step."
+        )
     for variable in component.start:
         fmu.variable(variable)
     if component.execution == "continuous":
@@ -247,6 +256,27 @@ def _check_component(component: Component) -> None:
         raise FmuError(f"component {name!r}: the delay of {late} exceeds its step of {component.step:g} s.")
     if (component.delay or component.jitter) and component.execution != "sampled":
         raise FmuError(f"component {name!r}: only a sampled component has a delay or jitter.")
+
+
+def _check_rollback(system: System) -> None:
+    """A tolerance of the coupling needs components that can all go back, and that step together."""
+    if system.coupling_tolerance is None:
+        return
+    first = system.components[0]
+    for component in system.components:
+        what = ""
+        if component.execution != "coupled":
+            what = f"is {component.execution}; a coupling tolerance needs execution = 'coupled' throughout"
+        elif component.step != first.step:
+            what = (
+                f"steps by {component.step:g} s, {first.name!r} by {first.step:g} s; give all the same step"
+            )
+        elif not any(component.fmu.capabilities.get(f"canGetAndSetFMU{s}") for s in ("state", "State")):
+            what = "cannot be put back to a former state (canGetAndSetFMUstate); leave coupling_tolerance out"
+        elif not component.fmu.capabilities.get("canHandleVariableCommunicationStepSize"):
+            what = "takes steps of one size only; leave coupling_tolerance out"
+        if what:
+            raise FmuError(f"component {component.name!r} {what}.")
 
 
 def default_execution(fmu: FmuDescription, step: float | None) -> Execution:

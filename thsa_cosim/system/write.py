@@ -65,6 +65,8 @@ def _structure(system: System, experiment: DefaultExperiment) -> bytes:
     for component in system.components:
         _component(elements, component)
     links = _sub(whole, SSD, "Connections")
+    if system.coupling_tolerance is not None:
+        _annotate(whole, "Coupling", {"tolerance": repr(system.coupling_tolerance)})
     for connector in system.connectors:
         for (element, name), factor, offset in connector.pins:
             inner = {"Element": element, "Connector": name}

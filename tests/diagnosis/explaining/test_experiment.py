@@ -107,7 +107,7 @@ def find(monkeypatch: pytest.MonkeyPatch, other: Force, **changed: Any) -> Any:
     def open_runner(_: Any, experiments: Any) -> Any:
         return Rig(experiments, {1.0: mine, 2.0: other}, broken)
 
-    winner = scored("windage", 1.0, np.zeros(TIME.size))
+    winner = scored("windage", 1.0, np.zeros(TIME.size), changed.pop("own", 1e12))
     rival = scored("stribeck:screw", 2.0, np.full(TIME.size, 0.5), known)
     attribution = SimpleNamespace(
         rounds=(
@@ -178,6 +178,20 @@ def test_what_a_rival_imitates_once_it_is_fitted_does_not_count(monkeypatch: pyt
     only = find(monkeypatch, lambda s: 0.5 * np.sign(s["v_cmd"]), known=1e-6)
     assert only.expected < 1.0
     assert not only.separates
+
+
+def test_the_rival_may_be_the_true_one(monkeypatch: pytest.MonkeyPatch):
+    """What the accepted effect imitates once it is fitted to the rival's outputs does not count either."""
+    free = find(monkeypatch, dragging, own=1e-6)
+    assert free.expected < 0.5 * free.distance
+    assert free.expected > 36.0, "creep is left"
+
+
+def test_a_profile_that_settles_comes_before_a_larger_gap_that_does_not():
+    settles, sure, large = (
+        room._worth(gap, wanted) for gap, wanted in ((70.0, 30.0), (90.0, 30.0), (400.0, 900.0))
+    )
+    assert sure > settles > large > room._worth(300.0, 900.0)
 
 
 def test_one_law_under_two_names_is_separated_by_nothing(monkeypatch: pytest.MonkeyPatch):

@@ -7,14 +7,15 @@ that may also move the order misses it: a small change of the order makes up for
 from collections.abc import Sequence
 from dataclasses import replace
 
-from thsa_cosim.diagnosis.choosing.gates import NEXT_SHARE, SIGMAS, SMALLEST_STRUCTURE, out_of_range
+from thsa_cosim.diagnosis.choosing.gates import NEXT_SHARE, SIGMAS, out_of_range
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.choosing.selection import Say
+from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE, is_visible
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
-from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, structure
+from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, errors, structure
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
@@ -45,7 +46,7 @@ def freed(
     ``found``: the fit of the model with it and its held-out residuals (N,); those that count come back.
     """
     fit, held = found
-    if not choice.proposal.held or weights.left(held) < SMALLEST_STRUCTURE**2:
+    if not choice.proposal.held or not _leaves_structure(bench, weights, held):
         return choice, *found
     say(f"fitting {choice.candidate.name} with a free order")
     proposal = replace(choice.proposal, held=frozenset())
@@ -61,3 +62,8 @@ def freed(
     if not explains or consistency(block_gains(trials, held, validate)) < SIGMAS:
         return choice, *found
     return replace(choice, proposal=proposal, fit=free, validate=validate), free, validate
+
+
+def _leaves_structure(bench: Bench, weights: ChannelWeights, held: FloatArray) -> bool:
+    """Whether the verdict on the held-out residuals (N,) would be that something is left."""
+    return is_visible(errors(bench.of("validate"), weights.plain(held, "validate")), VISIBLE_BESIDE)

@@ -6,7 +6,7 @@ the rig cannot do is left out, and the most promising ones are judged with the r
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice, product
+from itertools import islice, permutations, product
 
 import numpy as np
 
@@ -28,7 +28,11 @@ LONGEST, SAMPLES = 12.0, 12001
 #: An output may go this much beyond what was recorded, as a share of its range, where no limit says else.
 MARGIN = 0.2
 #: Profiles that are judged by the rivals fitted to them, the most promising first.
-JUDGED = 3
+JUDGED = 5
+#: So many of them for the size of the gap alone, the others for its size beside that of the effect.
+FARTHEST = 3
+#: Profiles that are judged by how sure they make a value.
+SHARPENED = 3
 #: Rivals that are told apart at a time.
 MOST_RIVALS = 3
 #: An expected gap this many times what the decision asks for is counted on.
@@ -90,9 +94,8 @@ class _Plan:
             return None
         if len(self.models) == 1:
             return self._sharpest(ran)
-        promising = sorted(ran, key=lambda r: -min(_distances(r)))[:JUDGED]
-        judged = [(self._gaps(r), r) for r in promising]
-        gaps, best = max(judged, key=lambda pair: min(pair[0]))
+        judged = [(self._gaps(r), self._effect(r), r) for r in self._promising(ran)]
+        gaps, effect, best = max(judged, key=lambda one: _worth(min(one[0]), _wanted(one[1])))
         worst = int(np.argmin(gaps))
         names = tuple(m.candidate.name for m in self.models)
         return SeparatingExperiment(
@@ -102,9 +105,16 @@ class _Plan:
             self._present(worst + 1, best.inputs.time.size),
             best.inputs,
             expected=gaps[worst],
-            separates=gaps[worst] >= SAFETY * max(SIGMAS**2, APART_SHARE * self._effect(best)),
+            separates=gaps[worst] >= SAFETY * _wanted(effect),
             reached=best.reached,
         )
+
+    def _promising(self, ran: Sequence[_Ran]) -> list[_Ran]:
+        """The profiles in which the models are farthest apart, absolutely and beside what the effect does there."""
+        apart = [min(_distances(r)) for r in ran]
+        beside = [d / _wanted(effect) for d, effect in zip(apart, self._without(ran), strict=True)]
+        order = [*np.argsort(-np.array(apart))[:FARTHEST], *np.argsort(-np.array(beside))]
+        return [ran[k] for k in dict.fromkeys(map(int, order))][:JUDGED]
 
     def _ran(self) -> list[_Ran]:
         """Every profile of the menu that all models can run within the limits."""
@@ -227,14 +237,35 @@ class _Plan:
         return found
 
     def _gaps(self, ran: _Ran) -> list[float]:
-        """Expected gap to every rival, fitted, if the accepted effect is the true one."""
-        gaps = []
-        for number in range(1, len(self.models)):
-            jacobian = self._jacobian(ran, number)
-            difference = ran.outputs[0] - ran.outputs[number]
-            information = self.models[number].fit.information
-            gaps.append(0.0 if jacobian is None else expected_gain(information, jacobian, difference))
-        return gaps
+        """Smallest expected gap between every rival and any other model, whichever of the two is true.
+
+        The one that is not is fitted. That the accepted effect is the true one is what nobody knows yet.
+        """
+        count = len(self.models)
+        jacobians = [self._jacobian(ran, number) for number in range(count)]
+        gaps = np.full((count, count), np.inf)
+        for true, number in permutations(range(count), 2):
+            jacobian, information = jacobians[number], self.models[number].fit.information
+            difference = ran.outputs[true] - ran.outputs[number]
+            gaps[true, number] = 0.0 if jacobian is None else expected_gain(information, jacobian, difference)
+        return [float(min(gaps[k].min(), gaps[:, k].min())) for k in range(1, count)]
+
+    def _neutral(self) -> FloatArray:
+        """(n,) the accepted model's vector without its effect."""
+        model, fit = self.models[0], self.models[0].fit
+        own = {p.variable: p.neutral for p in model.candidate.coefficients}
+        values = fit.unknowns.named(fit.vector)
+        return np.array([own.get(name, values[name]) for name in fit.unknowns.names])
+
+    def _without(self, ran: Sequence[_Ran]) -> list[float]:
+        """What the accepted effect does in every profile: squared distance of the outputs without it."""
+        runs = self._run(
+            [r.profile for r in ran], [r.inputs for r in ran], [(self.models[0], self._neutral())]
+        )
+        return [
+            0.0 if own is None else float(np.sum((r.outputs[0] - self._weighted(own)) ** 2))
+            for r, (own,) in zip(ran, runs, strict=True)
+        ]
 
     def _effect(self, ran: _Ran) -> float:
         """What the accepted effect does in a profile beyond what the declared parameters can imitate."""
@@ -242,10 +273,8 @@ class _Plan:
         if jacobian is None:
             return 0.0
         model, fit = self.models[0], self.models[0].fit
-        own = {p.variable: p.neutral for p in model.candidate.coefficients}
-        values = fit.unknowns.named(fit.vector)
-        without = np.array([own.get(name, values[name]) for name in fit.unknowns.names])
-        (signals,) = self._run([ran.profile], [ran.inputs], [(model, without)])
+        own = {p.variable for p in model.candidate.coefficients}
+        (signals,) = self._run([ran.profile], [ran.inputs], [(model, self._neutral())])
         if signals[0] is None:
             return 0.0
         declared = [k for k, u in enumerate(fit.unknowns.members) if u.name not in own and u.declared]
@@ -264,7 +293,7 @@ class _Plan:
         own = [p.variable for p in model.candidate.parameters if p.variable in fit.unknowns.names]
         index = fit.unknowns.index(own)
         best: SeparatingExperiment | None = None
-        for one in sorted(ran, key=lambda r: -_moved(r, self))[:JUDGED]:
+        for one in sorted(ran, key=lambda r: -_moved(r, self))[:SHARPENED]:
             jacobian = self._jacobian(one, 0)
             if jacobian is None:
                 continue
@@ -278,6 +307,16 @@ class _Plan:
                     separates=False, reached=one.reached, sharpens=sharpened,
                 )  # fmt: skip
         return best
+
+
+def _wanted(effect: float) -> float:
+    """The gap that distinguishes a rival from an accepted effect that does ``effect``, as the decision asks for it."""
+    return max(SIGMAS**2, APART_SHARE * effect)
+
+
+def _worth(gap: float, wanted: float) -> tuple[bool, float]:
+    """Profiles that settle the tie come first, and those with the larger gap."""
+    return gap >= SAFETY * wanted, gap
 
 
 def _moved(ran: _Ran, plan: _Plan) -> float:

@@ -340,7 +340,10 @@ def _notes(studies: Sequence[Study], rows: Sequence[Row]) -> Iterator[str]:
     unsure = [r.name for r in rows if _is_untested(r)]
     if unsure:
         names = ", ".join(dict.fromkeys(unsure))
-        yield f"Not determined by the data of at least one study, hence no standard error of the difference: {names}."
+        yield (
+            f"Not determined by the data of at least one study, hence no standard error of the difference: {names}."
+            " Where the data determine only a combination of them, give one in [fixed], alike in all studies."
+        )
     other = [r.name for r in rows if not r.same_unit]
     if other:
         yield f"In different units, so not subtracted: {', '.join(dict.fromkeys(other))}."

@@ -180,7 +180,8 @@ def next_experiment(content: Content) -> list[str]:
         one = best["sharpens"]
         return [
             f"Next experiment: {best['name']} ({best['file']}). Expected: the standard error of {one['variable']} falls"
-            f" from {number(one['before'], 2)} to {number(one['after'], 2)}."
+            f" from {number(one['before'], 2)} to {number(one['after'], 2)}{_unit(_unit_of(content, one['variable']))}."
+            " Then diagnose again with --with RECORDING."
         ]
     names = " from ".join([best["rivals"][0], ", ".join(best["rivals"][1:])])
     expected = best.get("expected", best["distance"])
@@ -193,6 +194,13 @@ def next_experiment(content: Content) -> list[str]:
         f"To distinguish {names}, run {best['name']} ({best['file']}). Expected: a gap of {number(expected**0.5, 2)}"
         " standard deviations once the rival is fitted to it. Then diagnose again with --with RECORDING."
     ]
+
+
+def _unit_of(content: Content, variable: str) -> str:
+    """Unit of an effect's parameter by its variable; "1" for one that is not listed."""
+    name = variable.rpartition(".")[2]
+    listed = {n: p["unit"] for e in content["effects"] for n, p in e["parameters"].items()}
+    return str(listed.get(variable, listed.get(name, "1")))
 
 
 def _undetermined(content: Content) -> list[str]:

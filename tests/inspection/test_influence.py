@@ -101,3 +101,14 @@ def test_values_that_are_not_determined_are_not_asked_for() -> None:
     assert influences(residuals, [replace(p, stderr=None) for p in known]) == []
     (finding,) = influences(residuals, [replace(known[0], stderr=None), known[1]])
     assert "b changes" in finding.text
+
+
+def test_a_misfit_in_one_part_of_a_recording_is_not_explained() -> None:
+    rng = np.random.default_rng(3)
+    values = rng.normal(0.0, 1.0, 4000)
+    residual = Residual("run", "T", values, NOISE, "N.m", {}, TIME)
+    assert judge([residual]).verdict == "explained"
+    louder = np.where((TIME > 2.5) & (TIME < 3.0), 1.8, 1.0) * values
+    (reason,) = judge([replace(residual, values=louder)]).reasons
+    assert "from 2.5 s to" in reason
+    assert reason.endswith("of run")

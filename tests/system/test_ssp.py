@@ -394,3 +394,8 @@ def test_what_is_wrong_with_a_system_is_one_sentence(parts, wires, connectors, s
 def test_units_that_do_not_convert_are_refused() -> None:
     with pytest.raises(FmuError, match=r"connection a\.steps -> |connection a\.tau"):
         assemble("s", [Part("a", build.lag2()), Part("b", build.lag2())], [Wire("a.tau", "b.u")], {})
+
+
+def test_clocks_that_an_importer_has_to_tick_are_refused() -> None:
+    with pytest.raises(FmuError, match=r"component 'a': .* has clocks that the importer has to tick"):
+        assemble("s", [Part("a", build.clock3())], [], {})

@@ -22,6 +22,8 @@ _FOLLOWS = 0.1
 """Share that an input, or how it changes, accounts for."""
 _DEPENDS, _LEVELS, _LEAST_LEVELS = 0.04, 16, 30
 """Share that the signal's own size accounts for; by how many levels of it, of how many samples at least."""
+_PARTS, _LEAST_PART = 8, 200
+"""Parts of a recording that are judged on their own, and their samples at least."""
 _LAGS = 20
 _MOST_REASONS = 12
 
@@ -93,6 +95,10 @@ def _channel(channel: str, own: Sequence[Residual]) -> list[str]:
         reasons.append(f"{channel} is missed by {together:.3g} times its noise ({rmse})")
     elif sizes and sizes[worst] > _LARGE:
         reasons.append(f"{channel} is missed by {sizes[worst]:.3g} times its noise in {worst}")
+    elif part := max((_worst_part(r) for r in own), default=None):
+        size, where, recording = part
+        if size > _LARGE:
+            reasons.append(f"{channel} is missed by {size:.3g} times its noise {where} of {recording}")
     if not reasons and together < 1.0:
         return reasons
     structure = float(np.mean([_predictable(r.values) for r in own])) if own else 0.0
@@ -113,6 +119,18 @@ def _channel(channel: str, own: Sequence[Residual]) -> list[str]:
             " sensor that is not linear, or a missing effect"
         )
     return reasons
+
+
+def _worst_part(residual: Residual) -> tuple[float, str, str]:
+    """The largest rms / noise of any eighth of a recording, which one, and of which recording."""
+    values, time = residual.values, residual.time
+    if values.size < _PARTS * _LEAST_PART:
+        return 0.0, "", residual.recording
+    parts = np.array_split(np.arange(values.size), _PARTS)
+    worst = max(parts, key=lambda part: _rms(values[part]))
+    first, last = int(worst[0]), int(worst[-1])
+    where = f"from {time[first]:.4g} s to {time[last]:.4g} s" if time.size == values.size else "in a part"
+    return _rms(values[worst]), where, residual.recording
 
 
 def _rms(values: FloatArray) -> float:

@@ -228,6 +228,11 @@ def _check_component(component: Component) -> None:
     fmu, name = component.fmu, component.name
     if fmu.fmi_version == "1.0":
         raise FmuError(f"component {name!r}: {fmu.path.name} is FMI 1.0; a system takes FMI 2.0 and 3.0.")
+    if timed := [clock.name for clock in fmu.clocks if clock.is_timed]:
+        raise FmuError(
+            f"component {name!r}: {fmu.path.name} has clocks that the importer has to tick ({', '.join(timed)}), "
+            "which a system does not do; export it without clocks and give it execution = 'sampled' with a step."
+        )
     for variable in component.start:
         fmu.variable(variable)
     if component.execution == "continuous":

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from inspection.defects import DEFECTS
 from thsa_cosim.inspection import Finding, inspect_file
-from thsa_cosim.inspection.channel import Channel
+from thsa_cosim.inspection.channel import Channel, correlation
 from thsa_cosim.inspection.recording import inspect_channels
 from thsa_cosim.inspection.time_axis import time_findings
 from thsa_cosim.recordings import noise_estimate
@@ -233,3 +233,12 @@ def test_a_schedule_of_set_points_is_no_coarse_sensor() -> None:
     time, columns = stepped()
     columns["x"] = np.round(30.0 * np.sin(time))  # a sensor: from one level to the next
     assert findings(time, columns) == [("x", "coarse-resolution")]
+
+
+def test_signals_that_do_not_vary_have_no_correlation() -> None:
+    noise = np.random.default_rng(1).normal(size=200)
+    with np.errstate(all="raise"):
+        assert correlation(np.full(200, 3.0), noise) == 0.0
+        assert correlation(np.full(200, 1e308), np.full(200, 1e308)) == 0.0
+        assert correlation(noise, 2.0 - 3.0 * noise) == pytest.approx(-1.0)
+        assert correlation(np.array([1.0]), np.array([2.0])) == 0.0

@@ -1,6 +1,7 @@
 """Parquet, MAT, TDMS and MF4: the same signals come back, with the units and times that the files state."""
 
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -255,6 +256,20 @@ def test_mf4_with_units_and_a_time_axis_per_group(tmp_path):
     assert found.signals["T_amb"] == pytest.approx(-30.0 + TIME)
     with pytest.raises(UnitError, match="by the file"):
         read_recording(file, {"v": Column("speed", "m/s")}, units=UNITS)
+
+
+def test_a_reader_that_is_ended_leaves_no_temporary_file(tmp_path, monkeypatch):
+    asammdf = pytest.importorskip("asammdf")
+    file, temporary = tmp_path / "run.mf4", tmp_path / "temporary"
+    temporary.mkdir()
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append([asammdf.Signal(SPEED, TIME, unit="mm/s", name="speed")])
+        mdf.save(file)
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    with pytest.raises(RecordingError, match="force"):
+        read_recording(file, {"F_load": Column("force", "N")}, units=UNITS)
+    assert not list(temporary.iterdir())
 
 
 @pytest.mark.parametrize(("ending", "module"), [("tdms", "nptdms"), ("mf4", "asammdf"), ("mat", "h5py")])

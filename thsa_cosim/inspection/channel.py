@@ -209,3 +209,13 @@ class Channel:
 def share(part: float) -> str:
     """A share in words: ``5.1 %``."""
     return f"{100.0 * part:.2g} %"
+
+
+def correlation(a: FloatArray, b: FloatArray) -> float:
+    """Pearson's correlation of two signals (n,); 0 where one of them does not vary beyond its rounding."""
+    if a.size < 2:
+        return 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        a, b = a - a.mean(), b - b.mean()
+        size = float(np.linalg.norm(a) * np.linalg.norm(b))
+        return float(a @ b) / size if size > 0.0 and np.isfinite(size) else 0.0

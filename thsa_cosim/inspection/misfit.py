@@ -13,6 +13,7 @@ import numpy as np
 
 from thsa_cosim.errors import UnitError
 from thsa_cosim.inspection.across import SLIPS, slip
+from thsa_cosim.inspection.channel import correlation
 from thsa_cosim.inspection.finding import Finding, Severity
 from thsa_cosim.inspection.remainder import Column, Remainder, Slip, orthonormal
 from thsa_cosim.inspection.trust import Residual
@@ -101,11 +102,11 @@ def _against(residual: Residual) -> Finding | None:
     measured = residual.simulated - residual.values * residual.noise
     if not np.ptp(measured) > 20.0 * residual.noise or not np.ptp(residual.simulated) > residual.noise:
         return None
-    correlation = float(np.corrcoef(measured, residual.simulated)[0, 1])
-    if not correlation < _AGAINST:
+    likeness = correlation(measured, residual.simulated)
+    if not likeness < _AGAINST:
         return None
     name = residual.channel
-    text = f"{name} does the opposite of what the model says (their correlation is {correlation:.2f})"
+    text = f"{name} does the opposite of what the model says (their correlation is {likeness:.2f})"
     remedy = f"[recordings.columns.{name}]\nscale = -1"
     return Finding(residual.recording, name, "sign", "error", text, (), remedy)
 

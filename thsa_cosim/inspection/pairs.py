@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from thsa_cosim.errors import UnitError
-from thsa_cosim.inspection.channel import Channel
+from thsa_cosim.inspection.channel import Channel, correlation
 from thsa_cosim.inspection.finding import Finding, Severity
 from thsa_cosim.recordings.outliers import Mask
 from thsa_cosim.signals import FloatArray
@@ -64,9 +64,7 @@ def _one(a: Channel, b: Channel) -> bool:
 
 
 def _correlation(a: FloatArray, b: FloatArray) -> float:
-    if a.size < 50 or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
-        return 0.0
-    return float(np.corrcoef(a, b)[0, 1])
+    return correlation(a, b) if a.size >= 50 else 0.0
 
 
 def _signed(values: FloatArray) -> bool:

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 from thsa_cosim.errors import MissingExtraError, RecordingError, ThsaCosimError
@@ -40,19 +41,26 @@ def read(format_: str, path: Path, choose: Choose) -> dict[str, RawColumn]:
     part = PARTS[format_] if _is_there(PARTS[format_]) else ""
     command = [sys.executable, "-m", "thsa_cosim.recordings.foreign", format_, str(path), part]
     root = str(Path(__file__).parents[2])
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
-    ) as process:
-        timer = threading.Timer(DEADLINE_S, process.kill)
-        timer.start()
-        try:
-            return _converse(process, format_, path, choose)
-        except (EOFError, BrokenPipeError, pickle.UnpicklingError):
-            pass
-        finally:
-            timer.cancel()
-            process.kill()
+    paths = os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])
+    # A folder of its own, because a parser that is ended leaves its temporary files behind.
+    with TemporaryDirectory(prefix="thsa-cosim-", ignore_cleanup_errors=True) as temporary:
+        environment = {
+            **os.environ,
+            "PYTHONPATH": paths,
+            **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), temporary),
+        }
+        with subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
+        ) as process:
+            timer = threading.Timer(DEADLINE_S, process.kill)
+            timer.start()
+            try:
+                return _converse(process, format_, path, choose)
+            except (EOFError, BrokenPipeError, pickle.UnpicklingError):
+                pass
+            finally:
+                timer.cancel()
+                process.kill()
     raise RecordingError(f"{path}: is damaged: its reader ended without an answer; export it again.")
 
 

@@ -64,7 +64,7 @@ def _merged(remedies: Sequence[str]) -> list[str]:
 
 
 def _line(finding: Finding) -> Text:
-    line = Text(f"{finding.severity}: ", style=STYLES[finding.severity])
+    line = Text(f"data {finding.severity}: ", style=STYLES[finding.severity])
     line.append(f"{finding.recording}, {finding.channel}: {finding.kind}: {finding.text}", style="default")
     return line
 

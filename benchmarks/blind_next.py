@@ -171,7 +171,7 @@ class Unit:
         limits = LIMITS.model_copy(update={"range": {**LIMITS.range, "i": (-1e3, 1e3), "u": (-1e3, 1e3)}})
         scenario: Any = SimpleNamespace(simulation=None)
         spec: Any = SimpleNamespace(command="v", load="N", limits=limits)
-        return separating_experiment(scenario, spec, found, bench.trials, open_runner)  # type: ignore[arg-type]
+        return separating_experiment(scenario, spec, found, bench.trials, {}, open_runner)  # type: ignore[arg-type]
 
 
 def _declared() -> Unknowns:

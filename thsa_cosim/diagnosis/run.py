@@ -258,7 +258,12 @@ class _Closing:
             empirical=law,
             equivalence=equivalence(found),
             experiment=separating_experiment(
-                scenario, self.spec, found, self.bench.trials, self.study.open_runner
+                scenario,
+                self.spec,
+                found,
+                self.bench.trials,
+                dict(zip(after.fit.unknowns.names, map(float, sure_after), strict=True)),
+                self.study.open_runner,
             ),
             comparisons_before=_comparisons(before),
             comparisons_after=_comparisons(after) if changed else (),

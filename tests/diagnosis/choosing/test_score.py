@@ -285,3 +285,20 @@ def test_of_small_structure_the_share_is_one_of_it_and_of_none_nothing():
     none = scored_on(np.zeros(4000), np.zeros(4000))
     assert none is not None
     assert (none.share, none.held_out_gain) == (0.0, 0.0)
+
+
+def test_fits_share_the_columns_of_the_declared_parameters():
+    """A long recording's fits hold what is their own; a Jacobian beside it is put together when it is asked for."""
+    rng = np.random.default_rng(1)
+    columns = rng.normal(size=(SAMPLES, 1))
+    whole = replace(
+        fit(1.0, 1.0, 100.0), own=np.concatenate([columns, rng.normal(size=(SAMPLES, 1))], axis=1)
+    )
+    shared = whole.sharing(columns)
+    assert shared.shared is columns
+    assert shared.own.base is None
+    assert shared.own.shape == (SAMPLES, 1)
+    np.testing.assert_array_equal(shared.jacobian, whole.own)
+    np.testing.assert_array_equal(shared.information, whole.information)
+    np.testing.assert_allclose(shared.folded.information, whole.information)
+    assert shared.folded.shared is None

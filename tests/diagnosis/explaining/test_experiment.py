@@ -116,9 +116,16 @@ def find(monkeypatch: pytest.MonkeyPatch, other: Force, **changed: Any) -> Any:
         accepted=(winner,),
     )
     spec = SimpleNamespace(command="v_cmd", load="F_load", limits=limits)
-    given = {"found": attribution, "spec": spec} | changed
+    given = {"found": attribution, "spec": spec, "stated": {}} | changed
     scenario = SimpleNamespace(simulation=None)
-    return room.separating_experiment(scenario, given["spec"], given["found"], [trial()], open_runner)  # type: ignore[arg-type]
+    return room.separating_experiment(
+        scenario,  # type: ignore[arg-type]
+        given["spec"],
+        given["found"],
+        [trial()],
+        given["stated"],
+        open_runner,
+    )
 
 
 def slow(inputs: Signals) -> np.ndarray:
@@ -265,6 +272,14 @@ def test_without_a_tie_the_least_certain_value_is_made_surer(monkeypatch: pytest
     gained = np.sum((loaded(best.inputs) / NOISE) ** 2)
     assert best.sharpens.after == pytest.approx((25.0 + gained) ** -0.5, rel=1e-3)
     assert "at the highest load" in best.name
+    for stated, expected in ((0.7, 0.7), (np.inf, 0.2)):
+        again = find(monkeypatch, slow, mine=loaded, found=found, stated={"k": stated}).sharpens
+        assert again.before == pytest.approx(expected), (
+            "the error that the result states, where it states one"
+        )
+        assert again.ratio == pytest.approx(best.sharpens.ratio)
+    winner.fit.vector = np.array([1.0, 0.0])
+    assert find(monkeypatch, slow, mine=loaded, found=found).sharpens.variable == "k", "a value of zero"
 
 
 def test_nothing_to_separate(monkeypatch: pytest.MonkeyPatch):

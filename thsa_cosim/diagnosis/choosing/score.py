@@ -84,7 +84,7 @@ def score(
         iterations=iterations,
         enough=3.0,
     )
-    return None if fit is None else _scored(bench, proposal, fit, current, held)
+    return None if fit is None else _scored(bench, proposal, fit.sharing(current.jacobian), current, held)
 
 
 def go_on(bench: Bench, scored: Scored, current: Fit, held: FloatArray, iterations: int = 4) -> Scored:
@@ -103,7 +103,10 @@ def go_on(bench: Bench, scored: Scored, current: Fit, held: FloatArray, iteratio
         iterations=iterations,
         enough=3.0,
     )
-    return scored if again is None else _scored(bench, scored.proposal, again, current, held) or scored
+    if again is None:
+        return scored
+    again = again if fit.shared is None else again.sharing(fit.shared)
+    return _scored(bench, scored.proposal, again, current, held) or scored
 
 
 def _scored(bench: Bench, proposal: Proposal, fit: Fit, current: Fit, held: FloatArray) -> Scored | None:

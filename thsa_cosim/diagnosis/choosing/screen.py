@@ -19,7 +19,7 @@ from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 from thsa_cosim.signals import FloatArray
 
 _WANTED = 3.0 * RESPONSE
-_ROWS = 100_000
+_ROWS = 20_000
 #: Left of a response after orthogonalisation (as a share of its square) below which nothing can be said.
 TESTABLE = 1e-6
 

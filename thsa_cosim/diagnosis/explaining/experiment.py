@@ -46,13 +46,15 @@ def separating_experiment(
     spec: DiagnoseSpec,
     found: Attribution,
     trials: Sequence[Trial],
+    stated: Mapping[str, float],
     open_runner: OpenRunner,
 ) -> SeparatingExperiment | None:
     """The profile of ``spec.command`` and ``spec.load`` that says most, within the rig's limits.
 
     ``trials`` run the model that holds all effects. With a tie it is the one at which the accepted effect and its
     rivals differ most once each rival is fitted to it; without one, that which makes the least certain value of the
-    first effect surest. The other inputs are held at what they were in the first fit recording. None without an
+    first effect surest: its ``stated`` standard error (by name, in its unit) times what the profile is expected to make
+    of it. The other inputs are held at what they were in the first fit recording. None without an
     accepted effect, a command, or a profile that keeps the limits.
     """
     fit = [t for t in trials if t.part == "fit"]
@@ -62,7 +64,7 @@ def separating_experiment(
     one = next((r for r in kept if r.rivals), kept[0])
     assert one.accepted is not None
     models = (one.accepted, *one.rivals[:MOST_RIVALS])
-    plan = _Plan(scenario, spec, fit, one, models, open_runner)
+    plan = _Plan(scenario, spec, fit, one, models, stated, open_runner)
     return plan.best()
 
 
@@ -78,13 +80,17 @@ class _Ran:
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """The search over the menu; ``models``: the accepted effect and its rivals, as fitted in ``one`` round."""
+    """The search over the menu; ``models``: the accepted effect and its rivals, as fitted in ``one`` round.
+
+    ``stated``: standard errors of the identified values.
+    """
 
     scenario: Scenario
     spec: DiagnoseSpec
     fit: Sequence[Trial]
     one: Round
     models: tuple[Scored, ...]
+    stated: Mapping[str, float]
     open_runner: OpenRunner
 
     def best(self) -> SeparatingExperiment | None:
@@ -297,10 +303,15 @@ class _Plan:
             jacobian = self._jacobian(one, 0)
             if jacobian is None:
                 continue
-            before, after = (e * fit.unknowns.scale for e in expected_errors(fit.information, jacobian))
-            size = np.maximum(np.abs(fit.vector[index]), np.finfo(float).tiny)
-            worst = index[int(np.argmax(before[index] / size))]
-            sharpened = Sharpened(fit.unknowns.names[worst], float(before[worst]), float(after[worst]))
+            before, after = expected_errors(fit.information, jacobian)
+            # Beside its value, or beside the drawing's spread where the value is about zero.
+            size = np.maximum(np.abs(fit.vector), 1e-3 * fit.unknowns.scale) / fit.unknowns.scale
+            worst = index[int(np.argmax(before[index] / size[index]))]
+            name = fit.unknowns.names[worst]
+            stated = self.stated.get(name, np.inf)
+            if not np.isfinite(stated):
+                stated = float(before[worst] * fit.unknowns.scale[worst])
+            sharpened = Sharpened(name, stated, stated * float(after[worst] / before[worst]))
             if best is None or best.sharpens is None or sharpened.ratio < best.sharpens.ratio:
                 best = SeparatingExperiment(
                     one.profile.name, (model.candidate.name,), 0.0, 0.0, one.inputs,

@@ -29,16 +29,27 @@ DETERMINED = 1e-11
 class Fit:
     """A fitted vector (n,), the residuals (N,) there and their Jacobian (N, n) per ``scale`` of each unknown.
 
-    ``steps`` (n,) are the difference steps, in scales. ``cost``: sum of squares with the prior's.
+    ``steps`` (n,) are the difference steps, in scales. ``cost``: sum of squares with the prior's. ``shared``: the
+    Jacobian's first columns (N, m), which many fits hold together; ``own`` (N, n - m): the others.
     """
 
     unknowns: Unknowns
     vector: FloatArray
     residual: FloatArray
-    jacobian: FloatArray
+    own: FloatArray
     steps: FloatArray
     cost: float
     converged: bool
+    shared: FloatArray | None = None
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """(N, n) the Jacobian; put together each time where its first columns are shared."""
+        return self.own if self.shared is None else np.concatenate([self.shared, self.own], axis=1)
+
+    def sharing(self, columns: FloatArray) -> "Fit":
+        """The same with ``columns`` (N, m), which the first m of its Jacobian equal, in place of a copy of them."""
+        return replace(self, shared=columns, own=self.jacobian[:, columns.shape[1] :].copy())
 
     def at(self, names: Sequence[str]) -> FloatArray:
         """(m,) fitted values of the named unknowns."""
@@ -53,12 +64,13 @@ class Fit:
     def information(self) -> FloatArray:
         """(n, n) JᵀJ + prior, per scale."""
         prior = self.unknowns.precision * self.unknowns.scale
-        return np.asarray(self.jacobian.T @ self.jacobian + np.diag(prior**2))
+        jacobian = self.jacobian
+        return np.asarray(jacobian.T @ jacobian + np.diag(prior**2))
 
     @property
     def folded(self) -> "Fit":
         """The same with R (n, n) in place of the Jacobian, RᵀR = JᵀJ: what covariances need, without a row a sample."""
-        return replace(self, jacobian=np.asarray(np.linalg.qr(self.jacobian, mode="r")))
+        return replace(self, shared=None, own=np.asarray(np.linalg.qr(self.jacobian, mode="r")))
 
     @property
     def inflation(self) -> float:
@@ -80,7 +92,8 @@ class Fit:
         ``inflation`` widens what the recordings say; what the drawing says stays as it is.
         """
         prior = self.unknowns.precision * self.unknowns.scale
-        information = self.jacobian.T @ self.jacobian / inflation + np.diag(prior**2)
+        jacobian = self.jacobian
+        information = jacobian.T @ jacobian / inflation + np.diag(prior**2)
         size = np.sqrt(np.diag(information))
         size[size == 0.0] = 1.0
         values, vectors = np.linalg.eigh(information / np.outer(size, size))

@@ -14,8 +14,8 @@ from thsa_cosim.study import Case, build_case
 Part = Literal["fit", "validate"]
 
 #: Fit recordings of more residuals than this are compared by means of neighbouring samples: a diagnosis holds some
-#: hundred vectors of that length. 50 s of five signals at 1 kHz.
-ROWS = 250_000
+#: hundred vectors of that length. A minute of five signals at 1 kHz.
+ROWS = 300_000
 
 
 @dataclass(frozen=True, eq=False)

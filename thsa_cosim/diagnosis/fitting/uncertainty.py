@@ -41,12 +41,12 @@ def _scores(fit: Fit, trials: Sequence[Trial]) -> list[tuple[FloatArray, FloatAr
     """Per recording (per channel, where they are sampled apart) the scores (m, n), what white noise of the same size
     would make of their products (n, n), and the lags within `REACH`."""
     found: list[tuple[FloatArray, FloatArray, int]] = []
-    begin = 0
+    begin, whole = 0, fit.jacobian
     for trial in trials:
         own = []
         for channel in trial.case.channels:
             part = slice(begin, begin := begin + channel.measured.size)
-            residual, jacobian = fit.residual[part], fit.jacobian[part]
+            residual, jacobian = fit.residual[part], whole[part]
             lags = round(REACH * (part.stop - part.start) / max(float(np.ptp(channel.time)), 1e-12))
             own.append((residual[:, None] * jacobian, np.mean(residual**2) * (jacobian.T @ jacobian), lags))
         if len({len(score) for score, *_ in own}) == 1:  # sampled together: noise may be common to them

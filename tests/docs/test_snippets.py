@@ -43,6 +43,7 @@ NOT_RUN = {
         "minutes of studies; a nightly test of tests/shipped/test_measured_drives.py runs it"
     ),
     r"^thsa-cosim compare '?(before|unit)|MyDrive\.fmu": "the reader's own; tests/report/test_compare.py runs both",
+    r"benchmarks/redundant_recordings\.py": "tests/rig/test_redundant_diagnosis.py runs it",
     r"^python benchmarks/mutants\.py$": "takes most of an hour; tests/benchmarks/test_mutants.py tries its report",
     r"DATA_EMPS\.mat": "the data may not be shipped; tests/identify/test_emps.py runs it where they are",
 }

@@ -252,3 +252,13 @@ def test_a_study_of_every_kind_is_written_printed_drawn_and_opened(
     study = tc.open_study(done.folder)
     assert type(study) is KINDS[command].study
     assert study.result == result
+
+
+def test_values_that_no_polish_has_looked_at_are_not_called_undetermined(tmp_path: Path) -> None:
+    content = motor()
+    del content["search"]["profile"]
+    content["search"]["polish"] = False
+    done = conduct(ask("identify", content, folder=tmp_path / "study", workers=1), quiet=True)
+    result = strict((done.folder / "result.json").read_text(encoding="utf-8"))
+    assert not any(p["identifiable"] for p in result["points"][0]["parameters"].values())
+    assert not any("determine no parameter" in reason for reason in result["trust"]["reasons"])

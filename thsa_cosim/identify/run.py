@@ -332,7 +332,9 @@ class _Search:
         return [] if self._coupling is None or not self._coupling.reason else [self._coupling.reason]
 
     def _undetermined(self) -> list[str]:
-        """Points where no parameter is determined: whatever fits, it says nothing."""
+        """Points where no parameter is determined: whatever fits, it says nothing. Without a polish that is not known."""
+        if not self._scenario.search.polish:
+            return []
         return [
             f"the recordings determine no parameter at {point.label}: they are too short, or nothing in them shows it"
             for point in self._results()

@@ -19,8 +19,8 @@ from thsa_cosim.signals import FloatArray
 RESPONSE, SHARE = 60.0, 0.1
 SMALLEST, LARGEST = 1e-7, 0.3
 #: A step that gains this many times what it promised is tried at multiples. Where parts stick and slip, differences
-#: see events that move, and make the outputs more sensitive than they are over a longer way: steps stop short. Both were
-#: set while looking at one simulated unit with stick-slip.
+#: see events that move, and make the outputs more sensitive than they are over a longer way: steps stop short. Both
+#: were set while looking at one simulated unit with stick-slip.
 UNDERRATED, FURTHER = 1.25, (2.0, 4.0, 8.0)
 #: Information (of unknowns each scaled to 1) below which a combination of them is not determined at all.
 DETERMINED = 1e-11

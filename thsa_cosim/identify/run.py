@@ -332,7 +332,7 @@ class _Search:
         return [] if self._coupling is None or not self._coupling.reason else [self._coupling.reason]
 
     def _undetermined(self) -> list[str]:
-        """Points where no parameter is determined: whatever fits, it says nothing. Without a polish that is not known."""
+        """Points where no parameter is determined: whatever fits says nothing. Without a polish that is not known."""
         if not self._scenario.search.polish:
             return []
         return [

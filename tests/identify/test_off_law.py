@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identify.points import point_of
 from thsa_cosim.identify.off_law import off_law
 from thsa_cosim.identify.over_temperature import fit_laws
 from thsa_cosim.identify.results import Estimate, PointResult
@@ -39,25 +40,7 @@ def points(actual: tuple[float, ...], labels: tuple[float, ...] = LABELS, seed: 
             )
             for name, (value, error) in true.items()
         }
-        found.append(
-            PointResult(
-                label=f"{label:g} degC",
-                temperature_degC=label,
-                recordings=("run",),
-                parameters=parameters,
-                correlation=np.eye(3),
-                cost=1.0,
-                cost_per_sample=1.0,
-                terms={},
-                also={},
-                profiles={},
-                generations=(),
-                evaluations=1,
-                converged=True,
-                stopped="",
-                polished="",
-            )
-        )
+        found.append(point_of(label, parameters))
     return found
 
 

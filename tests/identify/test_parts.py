@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from identify.points import point_of
 from thsa_cosim.costs import Channel, ResidualReducer, TermsReducer
 from thsa_cosim.errors import InputError
 from thsa_cosim.fmu import DefaultExperiment, FmuDescription, Variable
@@ -70,23 +71,7 @@ def test_a_channel_of_too_few_samples_for_means_stays_as_it_is() -> None:
 
 
 def point(temperature: float | None, **values: float) -> PointResult:
-    return PointResult(
-        label=f"{temperature} degC",
-        temperature_degC=temperature,
-        recordings=("r",),
-        parameters={n: Estimate(v, "ohm", 0.01, True, "", 0.0, 9.0) for n, v in values.items()},
-        correlation=np.eye(len(values)),
-        cost=1.0,
-        cost_per_sample=1.0,
-        terms={},
-        also={},
-        profiles={},
-        generations=(),
-        evaluations=1,
-        converged=True,
-        stopped="",
-        polished="",
-    )
+    return point_of(temperature, {n: Estimate(v, "ohm", 0.01, True, "", 0.0, 9.0) for n, v in values.items()})
 
 
 POINTS = [point(t, R=1.0 + 0.1 * t) for t in (-20.0, 0.0, 10.0, 30.0)]

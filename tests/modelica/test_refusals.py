@@ -144,23 +144,23 @@ def test_what_would_be_wrong_is_refused_by_name(tmp_path: Path, source: str, sai
         causal_model(str(file), tmp_path / "none")
 
 
-def test_what_only_a_tool_knows_is_a_named_doubt(tmp_path: Path) -> None:
-    file = tmp_path / "M.mo"
-    file.write_text(
+DOUBTED = {
+    "what only a tool knows": (
         "model M Real x(start=1, fixed=true); discrete Real y(start=0, fixed=true); equation der(x) = -x; "
         "when terminal() then y = x; end when; end M;",
-        encoding="utf-8",
-    )
-    with pytest.warns(UserWarning, match=r"M.mo:1: terminal\(\) is taken as false"):
-        causal_model(str(file), tmp_path / "none")
-
-
-def test_an_output_without_a_value_in_a_branch_is_a_named_doubt(tmp_path: Path) -> None:
-    file = tmp_path / "M.mo"
-    file.write_text(
+        r"M.mo:1: terminal\(\) is taken as false",
+    ),
+    "an output without a value in a branch": (
         "model M Real y = f(time); end M; function f input Real u; output Real y; algorithm "
         "if u > 0.5 then y := 1; end if; end f;",
-        encoding="utf-8",
-    )
-    with pytest.warns(UserWarning, match=r"M.mo:1: f\(\) gives y no value in one of its branches"):
+        r"M.mo:1: f\(\) gives y no value in one of its branches",
+    ),
+}
+
+
+@pytest.mark.parametrize(("source", "said"), DOUBTED.values(), ids=DOUBTED)
+def test_what_may_be_wrong_is_a_named_doubt(tmp_path: Path, source: str, said: str) -> None:
+    file = tmp_path / "M.mo"
+    file.write_text(source, encoding="utf-8")
+    with pytest.warns(UserWarning, match=said):
         causal_model(str(file), tmp_path / "none")

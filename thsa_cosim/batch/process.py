@@ -15,6 +15,7 @@ from typing import Any, BinaryIO, cast
 
 import numpy as np
 
+from thsa_cosim import threads
 from thsa_cosim.batch import supervisor
 from thsa_cosim.batch.frames import Order, Recall, Setup, Stop, pack
 from thsa_cosim.batch.inbox import Event, Inbox
@@ -25,15 +26,6 @@ from thsa_cosim.system.member import AT_WORK
 
 _BOOT = ("-P", str(Path(supervisor.__file__)))
 """The supervisor as a script, without its folder in sys.path."""
-_ONE_THREAD = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "BLIS_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-    "NUMEXPR_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-)
 _PATIENCE_S = 3.0
 """How long a supervisor may take to end a worker and its family."""
 _FLOOD = 2**20
@@ -93,7 +85,7 @@ class WorkerProcess:
         self._progress_path = folder / "progress"
         self._progress_path.write_bytes(bytes(8 * PROGRESS_SLOTS))
         paths = [str(Path(p).absolute()) for p in sys.path]
-        environment = os.environ | dict.fromkeys(_ONE_THREAD, "1") | {supervisor.TAG: str(folder)}
+        environment = os.environ | dict.fromkeys(threads.ALL, "1") | {supervisor.TAG: str(folder)}
         with (folder / "console").open("ab") as console:
             self._process = subprocess.Popen(
                 [sys.executable, *_BOOT, json.dumps(paths), setup.root],

@@ -10,7 +10,7 @@ import traceback
 
 import click
 
-from thsa_cosim import __version__
+from thsa_cosim import __version__, threads
 from thsa_cosim.cli.check import check
 from thsa_cosim.cli.completion import completion
 from thsa_cosim.cli.demo import demo
@@ -76,20 +76,10 @@ def main() -> None:
     sys.exit(run_command(sys.argv[1:]))
 
 
-_ONE_THREAD = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "BLIS_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-)
-
-
 def run_command(arguments: list[str]) -> int:
     """Run one command line; return its exit code. Errors become one sentence on stderr."""
-    # Threads that wait for each other over products of a few columns cost ten times the products; read by the first
-    # import of NumPy, of SciPy. Whoever sets them keeps them.
-    for name in _ONE_THREAD:
+    # Whoever sets them keeps them.
+    for name in threads.BLAS:
         os.environ.setdefault(name, "1")
     try:
         code = cli.main(args=arguments, prog_name="thsa-cosim", standalone_mode=False)

@@ -31,7 +31,7 @@ def off_law(
     known = [p for p in points if p.temperature_degC is not None]
     t = np.array([p.temperature_degC for p in known], dtype=np.float64)
     fits = {n: found for n, law in laws.items() if (found := _members(known, n, law, t)) is not None}
-    far = {n: fit for n, fit in fits.items() if _worst(fit, t)[0] > _FAR and _worst(fit, t)[1] > _LARGE}
+    far = [name for name, fit in fits.items() if _is_far(fit, t)]
     if len(far) < _PARAMETERS:
         return None
     whole = _left(fits, t)
@@ -67,11 +67,11 @@ def _members(points: Sequence[PointResult], name: str, law: LawResult, t: FloatA
     return law.law.form, values, errors
 
 
-def _worst(fit: _Fit, t: FloatArray) -> tuple[float, float]:
-    """Largest distance from the law, in standard errors and in shares of the largest value."""
+def _is_far(fit: _Fit, t: FloatArray) -> bool:
+    """Whether a point lies off the law through all of them, by standard errors and by shares of the largest value."""
     form, values, errors = fit
     apart = np.abs(values - fit_law(form, t, values, errors)(t))
-    return float(np.max(apart / errors)), float(np.max(apart) / np.max(np.abs(values)))
+    return bool(np.max(apart / errors) > _FAR and np.max(apart) > _LARGE * np.max(np.abs(values)))
 
 
 def _left(fits: Mapping[str, _Fit], t: FloatArray, without: int | None = None) -> float:

@@ -192,18 +192,23 @@ class Channel:
         return f"{value:.4g} {self.unit}" if self.unit not in ("", "1") else f"{value:.4g}"
 
     def spans(self, mask: Mask, bridge: int = 10) -> tuple[Span, ...]:
-        """Return the stretches of ``mask`` (n,) in s; those closer than ``bridge`` samples are one."""
-        marked = np.flatnonzero(mask)
-        if marked.size == 0:
-            return ()
-        while True:
-            cuts = np.flatnonzero(np.diff(marked) > bridge)
-            if cuts.size < _MOST_SPANS or bridge > mask.size:
-                break
-            bridge *= 2
-        firsts = marked[np.concatenate(([0], cuts + 1))]
-        lasts = marked[np.concatenate((cuts, [marked.size - 1]))]
-        return tuple((float(self.time[a]), float(self.time[b])) for a, b in zip(firsts, lasts, strict=True))
+        """The stretches of ``mask`` (n,) in s, those closer than ``bridge`` samples as one."""
+        return spans(self.time, mask, bridge)
+
+
+def spans(time: FloatArray, mask: Mask, bridge: int = 10) -> tuple[Span, ...]:
+    """The stretches of ``mask`` (n,) in s of ``time`` (n,), those closer than ``bridge`` samples, or more, as one."""
+    marked = np.flatnonzero(mask)
+    if marked.size == 0:
+        return ()
+    while True:
+        cuts = np.flatnonzero(np.diff(marked) > bridge)
+        if cuts.size < _MOST_SPANS or bridge > mask.size:
+            break
+        bridge *= 2
+    firsts = marked[np.concatenate(([0], cuts + 1))]
+    lasts = marked[np.concatenate((cuts, [marked.size - 1]))]
+    return tuple((float(time[a]), float(time[b])) for a, b in zip(firsts, lasts, strict=True))
 
 
 def share(part: float) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from thsa_cosim.inspection.channel import spans
 from thsa_cosim.inspection.finding import Finding, Span
 from thsa_cosim.inspection.hidden import Expected
 from thsa_cosim.inspection.trust import Residual
@@ -27,7 +28,6 @@ _PARTS = 8
 _LEAST = 200
 _FEW = 0.1
 """Share of the samples up to which they are few."""
-_MOST_SPANS = 40
 
 
 def influences(residuals: Sequence[Residual], parameters: Sequence[Expected]) -> list[Finding]:
@@ -83,24 +83,23 @@ def _few_samples(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
     weights = np.where(far, _FAR / np.maximum(np.abs(fit.values), _FAR), 1.0)
     weighted = fit.slopes * weights[:, None]
     moved = fit.step(weighted.T @ fit.slopes, weighted.T @ fit.values)
-    moved = moved - fit.step(
-        fit.normal, fit.slopes.T @ fit.values
-    )  # what the search left undone is no influence
+    # What the search left undone is no influence.
+    moved = moved - fit.step(fit.normal, fit.slopes.T @ fit.values)
     worst = int(np.argmax(np.abs(moved) / fit.stderr))
     if abs(moved[worst]) < _MOVED * fit.stderr[worst]:
         return
     pull = fit.slopes[:, worst] * fit.values * (1.0 - weights)
     residual, own = max(_parts(residuals, far), key=lambda part: float(np.sum(np.abs(pull[part[1]]))))
     here = far[own]
-    spans = _spans(residual.time, here)
+    stretches = spans(residual.time, here)
     name = residual.channel
     text = (
         f"{int(np.sum(here))} samples of {name} ({100.0 * np.mean(here):.2g} %) lie more than {_FAR:g} times its noise"
         f" off the model, and {_change(fit, worst, moved)} if samples so far off weigh less"
     )
-    pairs = ", ".join(f"[{a:.6g}, {b:.6g}]" for a, b in spans)
+    pairs = ", ".join(f"[{a:.6g}, {b:.6g}]" for a, b in stretches)
     remedy = f'[cost]\nerror = "huber"  # or leave them out: [recordings.columns.{name}] mask = [{pairs}]'
-    yield Finding(residual.recording, name, "outlying-samples", "warning", text, spans, remedy)
+    yield Finding(residual.recording, name, "outlying-samples", "warning", text, stretches, remedy)
 
 
 def _stretches(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
@@ -109,9 +108,8 @@ def _stretches(fit: _Fit, residuals: Sequence[Residual]) -> Iterator[Finding]:
     whole, gradient = fit.variance(fit.normal), fit.slopes.T @ fit.values
     undone = fit.step(fit.normal, gradient)
     with np.errstate(divide="ignore", invalid="ignore"):
-        inflation = np.maximum(
-            fit.stderr**2 / whole, 1.0
-        )  # by correlated noise, as the stated errors have it
+        # By correlated noise, as the stated errors have it.
+        inflation = np.maximum(fit.stderr**2 / whole, 1.0)
     best: tuple[float, int, FloatArray, str, Span] | None = None
     for name in recordings:
         ends, normals, gradients = _by_parts(fit, residuals, name)
@@ -176,15 +174,3 @@ def _parts(residuals: Sequence[Residual], marked: Mask) -> list[tuple[Residual, 
         if marked[rows].any():
             found.append((r, rows))
     return found
-
-
-def _spans(time: FloatArray, marked: Mask) -> tuple[Span, ...]:
-    """The stretches of ``marked`` (n,) samples in s, those close to each other as one."""
-    at, bridge = np.flatnonzero(marked), 10
-    while True:
-        cuts = np.flatnonzero(np.diff(at) > bridge)
-        if cuts.size < _MOST_SPANS:
-            break
-        bridge *= 2
-    firsts, lasts = at[np.concatenate(([0], cuts + 1))], at[np.concatenate((cuts, [at.size - 1]))]
-    return tuple((float(time[a]), float(time[b])) for a, b in zip(firsts, lasts, strict=True))

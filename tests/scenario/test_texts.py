@@ -132,4 +132,6 @@ def test_check_takes_a_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     fmu = str(texts("2"))
     assert run_command(["check", fmu, "--start", "curve=no such = curve", "--duration", "0.1"]) == 3
     assert "EnterInitializationMode" in capsys.readouterr().out
-    assert run_command(["check", fmu, "--start", "curve=steep", "--start", "gain=2", "--duration", "0.1"]) == 0
+    assert (
+        run_command(["check", fmu, "--start", "curve=steep", "--start", "gain=2", "--duration", "0.1"]) == 0
+    )

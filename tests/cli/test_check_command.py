@@ -61,7 +61,7 @@ def test_options_of_an_fmu_and_the_exit_code_of_a_failed_one(
     [
         ("EMPS", "s, w; these take a start value: controller.difference.z, controller.hold.z"),
         ("Motor", "motor.w_m, motor.phi; each takes a start value"),
-        ("Screw", "1: nut.flange_b.s; none takes a start value"),
+        ("BrushlessMotor", "2: omega, i_m; none takes a start value"),
     ],
 )
 def test_states_are_listed_with_those_that_take_a_start_value(fmu: str, says: str) -> None:

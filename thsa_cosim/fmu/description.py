@@ -85,7 +85,7 @@ class Variable:
 
     @property
     def takes_start(self) -> bool:
-        """Whether a local variable or an output, such as a state, can be given a start value (FMI 2.0.4, clause 2.2.7)."""
+        """Whether a local variable or an output, such as a state, takes a start value (FMI 2.0.4, clause 2.2.7)."""
         started = self.causality in ("local", "output") and self.initial in ("exact", "approx")
         return started and self.variability != "constant"
 

@@ -212,10 +212,12 @@ class _Closing:
                 self.study.folder / WORK, self.study.open_runner,
             )  # fmt: skip
             terms = search.find()
-            law = None if terms is None else law_of(terms, added=self.spec.empirical)
             if terms is not None and self.spec.empirical:
                 # The share stays that of the effects: a law describes and explains nothing.
                 model, extended, after = self._with_law(terms)
+            if terms is not None:
+                fit = after.fit if self.spec.empirical else terms.final
+                law = law_of(terms, fit, added=self.spec.empirical)
         notes += off_the_drawing(after.fit)
         if model is not None and extended is not None:
             notes.append(

@@ -91,10 +91,12 @@ class Conclusion:
         law: EmpiricalLaw | None = None
         if verdict == "unexplained-structure" and self.box is None:
             terms = self._law_terms(extended.identified)
-            law = None if terms is None else law_of(terms, added=self.spec.empirical)
             if terms is not None and self.spec.empirical:
                 # The share stays that of the effects: a law describes and explains nothing.
                 extended = self._with_law(terms)
+            if terms is not None:
+                fit = extended.identified.fit if self.spec.empirical else terms.final
+                law = law_of(terms, fit, added=self.spec.empirical)
         after = extended.identified
         changed = after is not before
         between = between_models(found, after.fit, self.bench.of("fit"))

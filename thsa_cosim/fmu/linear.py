@@ -67,22 +67,15 @@ class OpenLoop:
 
 def state_names(description: FmuDescription) -> tuple[str, ...]:
     """Names of the continuous states, in the order of the state vector; FmuError if they are not stated."""
-    # Looked up for every run: the last description's names are kept.
-    if _last_names and _last_names[-1][0] is description:
-        return _last_names[-1][1]
-    by_reference = {v.value_reference: v.name for v in description.variables.values() if v.is_float}
-    names = tuple(by_reference.get(state, "") for state, _ in description.state_references)
-    if not names or not all(names) or len(names) != description.states:
+    if not description.state_names:
         raise FmuError(
             f"{description.path} does not say which variables its states are; it cannot be linearised."
         )
-    _last_names[:] = [(description, names)]
-    return names
+    return description.state_names
 
 
 _refusing: set[str] = set()
 """Digests of FMUs that do not give every derivative themselves: an instance that refused a call is not used again."""
-_last_names: list[tuple[FmuDescription, tuple[str, ...]]] = []
 
 
 def open_loop(

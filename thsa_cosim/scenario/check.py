@@ -235,8 +235,7 @@ def readable(fmu: FmuDescription, name: str, key: str) -> Variable:
 def settable(fmu: FmuDescription, name: str, key: str) -> Variable:
     """Return a variable that can be given a start value; ScenarioError otherwise."""
     variable = find_variable(fmu, name, key, fmu.parameters)
-    start_value = variable.initial in ("exact", "approx") and variable.causality in ("local", "output")
-    if variable.causality in _SETTABLE or (start_value and variable.variability != "constant"):
+    if variable.causality in _SETTABLE or variable.takes_start:
         return variable
     remedy = (
         f"give it in [recordings.columns.{name}]" if variable.causality == "input" else "choose a parameter"

@@ -8,11 +8,11 @@ from pathlib import Path
 from thsa_cosim.errors import ParameterError, ScenarioError, UnitError, did_you_mean, did_you_mean_path
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
+from thsa_cosim.scenario.diagnose_schema import DiagnoseOptionsTable
 from thsa_cosim.scenario.formula import parse_formula
 from thsa_cosim.scenario.model import BlackBoxSpec, DiagnoseSpec, ForceSpec
 from thsa_cosim.scenario.schema import (
     CommonTable,
-    DiagnoseOptionsTable,
     DiagnoseTable,
     IdentifyTable,
     ParameterTable,

@@ -12,11 +12,10 @@ from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.inspection import Inspection, inspect
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
+from thsa_cosim.scenario.diagnose_schema import BlackBoxTable, DiagnoseOptionsTable
 from thsa_cosim.scenario.schema import (
-    BlackBoxTable,
     CommonTable,
     CostTable,
-    DiagnoseOptionsTable,
     ForceTable,
     LawTable,
     SearchTable,

@@ -38,8 +38,10 @@ def _unsolved(block: Block) -> str:
 
 def _equation(label: str) -> str:
     """A label with its place shortened to file name and line, and its text to what can be read."""
-    found = re.fullmatch(r"(.*) \(([^()]*:\d+)\)", label)
-    return f"{_cut(found[1], 60)} ({short(found[2])})" if found else _cut(label, 60)
+    found = re.fullmatch(
+        r"(.*) \(([^()]*:\d+)\)(\)*)", label, re.DOTALL
+    )  # of derivatives: der(equation (place))
+    return f"{_cut(found[1] + found[3], 60)} ({short(found[2])})" if found else _cut(label, 60)
 
 
 def _cut(shown: str, most: int) -> str:

@@ -26,6 +26,7 @@ from thsa_cosim.diagnosis.choosing.findings import (
     off_the_drawing,
     values_of,
 )
+from thsa_cosim.diagnosis.choosing.hidden import hidden_parts, notes_on_hidden, widening
 from thsa_cosim.diagnosis.choosing.orders import Machine, machine_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes, held_shapes
 from thsa_cosim.diagnosis.choosing.spread import between_models
@@ -225,7 +226,10 @@ class _Closing:
         counts = dict(self.bench.failures)
         changed = after is not before
         between = between_models(found, after.fit, self.bench.of("fit"))
+        hidden = hidden_parts(found)
         sure_before, sure_after = _sure(before), np.hypot(_sure(after), between)
+        notes += notes_on_hidden(hidden, after.fit, sure_after)
+        sure_after = np.hypot(sure_after, widening(hidden, after.fit))
         for identified in (before, after) if changed else (before,):
             for reason, count in identified.failures.items():
                 counts[reason] = counts.get(reason, 0) + count

@@ -31,6 +31,7 @@ class Expected:
     """An identified ``value`` with its ``stderr``, and what the drawing says (``expected``; None: nothing).
 
     ``scale``: change of the value per unit of the parameter's column in ``Residual.slopes``, in ``unit``.
+    ``published``: whether ``expected`` is a published law's, no start value.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Expected:
     stderr: float | None
     expected: float | None
     scale: float
+    published: bool = False
 
 
 def hidden_gains(residuals: Sequence[Residual], parameters: Sequence[Expected]) -> Iterator[Finding]:

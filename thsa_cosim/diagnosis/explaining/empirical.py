@@ -20,6 +20,7 @@ from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import values_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified
 from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
@@ -116,11 +117,13 @@ class LawSearch:
         return Unknowns(tuple(u if u.declared else replace(u, start=values[u.name]) for u in members))
 
 
-def law_of(found: Attribution, *, added: bool) -> EmpiricalLaw:
-    """A search's accepted terms in the words of the result."""
-    values = values_of(found.final, declared=False)
+def law_of(found: Attribution, fit: Fit, *, added: bool) -> EmpiricalLaw:
+    """A search's accepted terms in the words of the result, with the values of ``fit``."""
+    values = values_of(fit, declared=False)
     terms = tuple(
-        EmpiricalTerm(scored.candidate.slot.name, LIBRARY[p.name][0], values[p.variable])
+        EmpiricalTerm(
+            scored.candidate.slot.name, LIBRARY[p.name][0], replace(values[p.variable], variable=p.variable)
+        )
         for scored in found.accepted
         for p in scored.candidate.coefficients
     )

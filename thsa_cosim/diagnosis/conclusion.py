@@ -103,7 +103,7 @@ class Conclusion:
         between = between_models(found, after.fit, self.bench.of("fit"))
         hidden = hidden_parts(found)
         sure_before, sure_after = _sure(before), np.hypot(_sure(after), between)
-        notes += notes_on_hidden(hidden, after.fit, sure_after)
+        told = notes_on_hidden(hidden, after.fit, sure_after)
         sure_after = np.hypot(sure_after, widening(hidden, after.fit))
         balances = close_balances(scenario, self.spec)
         return DiagnosisResult(
@@ -148,7 +148,7 @@ class Conclusion:
             threshold=found.rounds[0].threshold if found.rounds else 0.0,
             evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if changed else 0),
             failures=_failures(self.bench, *([before, after] if changed else [before])),
-            notes=tuple(self._notes(extended)),
+            notes=(*self._notes(extended), *told),
             data=with_slips(scenario.data, after, scenario.file_units),
             asked=scenario.table.model_dump(mode="json", by_alias=True, exclude_unset=True),
         )

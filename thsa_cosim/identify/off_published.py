@@ -73,7 +73,7 @@ def _finding(found: Sequence[tuple[float, int, Fitted]]) -> Finding:
     text = (
         f"{p.name} at {point.label}{others} is {p.value:.4g} {p.unit} where its published law says {expected:.4g}"
         f" ({off}{abs(p.value - expected) / stderr:.2g} standard errors), though what the fit leaves is noise: another"
-        f" machine than the law's, or an error of {signals} that {p.name} takes up, such as a gain, a dead zone or a lag;"
-        " calibrate before you use the value"
+        f" machine than the law's, or an error of {signals} that {p.name} takes up, such as a gain, a dead zone or a"
+        " lag; calibrate before you use the value"
     )
     return Finding(residual.recording, residual.channel, KIND, "warning", text)

@@ -13,7 +13,16 @@ from thsa_cosim.laws import FORMS
 from thsa_cosim.scenario.diagnose_schema import DiagnoseOptionsTable
 from thsa_cosim.scenario.recording_schema import RecordingsTable, TemperatureTable
 from thsa_cosim.scenario.system_schema import ModelTable
-from thsa_cosim.scenario.table import Name, NotNegative, Positive, Share, Table, check_order, check_pairs
+from thsa_cosim.scenario.table import (
+    Name,
+    NotNegative,
+    Positive,
+    Share,
+    StartValue,
+    Table,
+    check_order,
+    check_pairs,
+)
 from thsa_cosim.search.strategies import SearchMethod, Strategy
 
 
@@ -254,8 +263,9 @@ class CommonTable(ModelTable):
     temperature: TemperatureTable | None = None
     parameter_set: Name | None = None
     """Path of an SSV file with start values, for example the ``identified.ssv`` of a study."""
-    fixed: dict[Name, float | bool] = Field(default_factory=dict)
-    """Start values held in every run, by FMU variable, in the FMU's units; they win over ``parameter_set``.
+    fixed: dict[Name, StartValue] = Field(default_factory=dict)
+    """Start values held in every run, by FMU variable, in the FMU's units; they win over ``parameter_set``. A String
+    variable, be it a parameter or an input, gets a text in quotes, or the path of a file as ``{ file = "table.txt" }``.
     """
     cost: CostTable = CostTable()
     simulation: SimulationTable = SimulationTable()

@@ -4,7 +4,7 @@ Model Exchange components are integrated together (see ``integrated``), their co
 right-hand side; Co-Simulation components act at time events of the whole (see ``stepped``).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -122,6 +122,17 @@ class SystemInstance(Instance):
                         self._given.setdefault(name, {})[own] = factor * float(values[column]) + offset
         self._give_starts()
         self.set_values(channels, values)
+
+    def set_texts(self, texts: Mapping[int, str]) -> None:
+        """Set String variables of components through the names of the system."""
+        given: dict[str, dict[int, str]] = {}
+        for reference, text in texts.items():
+            for (name, own), *_ in self._pins[self._name(reference)]:
+                variable = self.parts[name].description.variable(own)
+                given.setdefault(name, {})[variable.value_reference] = text
+        for name, part in self.parts.items():
+            with named(name):
+                part.set_texts(given.get(name, {}))
 
     def _give_starts(self) -> None:
         for component in self._system.components:

@@ -209,7 +209,7 @@ class _Closing:
             self.study.place.say("looking for an empirical law")
             search = LawSearch(
                 scenario, self.spec, self.trials, self.unknowns, self.known, accepted, after,
-                self.study.folder / WORK, self.study.open_runner,
+                self.study.folder / WORK, self.study.open_runner, self.machine,
             )  # fmt: skip
             terms = search.find()
             if terms is not None and self.spec.empirical:

@@ -17,6 +17,7 @@ from thsa_cosim.diagnosis.choosing.selection import REFINED, worth_refining
 from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL, law_of
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 
+PACKAGE = Path(__file__).parents[3] / "modelica" / "THSA"
 SCREW = Slot("screw", "FrictionEffect", {"v": "m/s", "z": "m", "N": "N", "F": "N"})
 CANDIDATES = {c.coefficients[0].name: c for c in candidates_of(EMPIRICAL, (SCREW,), {})}
 
@@ -41,7 +42,7 @@ def test_several_terms_of_a_place_are_refined():
 def test_a_model_with_several_terms_is_named_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     monkeypatch.setattr(extend, "export_fmu", lambda *_, output, **__: output)
     terms = [CANDIDATES["k_vv"], CANDIDATES["k_Ns"]]
-    file, fmu = extend.write_extended_model(tmp_path, "THSA.Actuator", Path("THSA"), terms, {})
+    file, fmu = extend.write_extended_model(tmp_path, "THSA.Actuator", PACKAGE, terms, {})
     assert (file.name, fmu.name) == ("THSA_with_empirical.mo", "THSA_with_empirical.fmu")
     source = file.read_text()
     assert source.count("THSA.Effects.Empirical empirical(") == 1, "one block holds both terms"

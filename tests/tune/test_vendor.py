@@ -63,6 +63,7 @@ polish = false
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("defines", "step", "warned"), [(("EULER",), 0.02, True), ((), 0.002, False)])
 def test_what_half_the_step_changes_is_said_with_figures(
     tmp_path: Path, defines: tuple[str, ...], step: float, warned: bool

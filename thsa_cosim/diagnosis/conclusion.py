@@ -22,6 +22,7 @@ from thsa_cosim.diagnosis.choosing.findings import (
     off_the_drawing,
     values_of,
 )
+from thsa_cosim.diagnosis.choosing.hidden import hidden_parts, notes_on_hidden, widening
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.choosing.spread import between_models
@@ -100,7 +101,10 @@ class Conclusion:
         after = extended.identified
         changed = after is not before
         between = between_models(found, after.fit, self.bench.of("fit"))
+        hidden = hidden_parts(found)
         sure_before, sure_after = _sure(before), np.hypot(_sure(after), between)
+        told = notes_on_hidden(hidden, after.fit, sure_after)
+        sure_after = np.hypot(sure_after, widening(hidden, after.fit))
         balances = close_balances(scenario, self.spec)
         coupled = self._coupled(after)
         said = coupled.note if isinstance(coupled, CouplingError) else coupled
@@ -146,7 +150,7 @@ class Conclusion:
             threshold=found.rounds[0].threshold if found.rounds else 0.0,
             evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if changed else 0),
             failures=_failures(self.bench, *([before, after] if changed else [before])),
-            notes=(*self._notes(extended), *([said] if said else [])),
+            notes=(*self._notes(extended), *told, *([said] if said else [])),
             data=with_slips(scenario.data, after, scenario.file_units),
             asked=scenario.table.model_dump(mode="json", by_alias=True, exclude_unset=True),
             coupling=coupled if isinstance(coupled, CouplingError) else None,

@@ -201,11 +201,24 @@ def diagnosis(
         )
     return DiagnoseSpec.resolved(
         spec,
+        model=_class_of(path, spec.model),
         package=package,
         catalogue=own,
         spreads={p.name: spec.spread if p.spread is None else p.spread for p in table.parameters},
         blackbox=_black_box(path, spec, fmu),
     )
+
+
+def _class_of(path: Path, model: str | None) -> str | None:
+    """Return the class's name, or the path of the ``.mo`` file that holds it; ScenarioError without that file."""
+    if model is None or not model.endswith(".mo"):
+        return model
+    file = path.parent / model
+    if not file.is_file():
+        raise ScenarioError(
+            f"diagnose.model: there is no file {file}; correct the path.{did_you_mean_path(file)}"
+        )
+    return str(file)
 
 
 def _black_box(path: Path, spec: DiagnoseOptionsTable, fmu: FmuDescription) -> BlackBoxSpec | None:

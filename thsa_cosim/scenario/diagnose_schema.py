@@ -70,8 +70,8 @@ class DiagnoseOptionsTable(Table):
     """``[diagnose]``: the model that effects are added to, and which are tried."""
 
     model: Name | None = None
-    """Modelica class with effect slots, such as ``"THSA.Actuator"``; left out: the FMU is a black box, and
-    ``[diagnose.blackbox]`` names its signals."""
+    """Modelica class with effect slots, such as ``"THSA.Actuator"``, or the ``.mo`` file that holds it; left out: the
+    FMU is a black box, and ``[diagnose.blackbox]`` names its signals."""
     package: Name | None = None
     """Folder of its package, relative to the scenario; left out: ``../modelica/THSA``, or the one that is shipped."""
     effects: list[Name] = Field(default_factory=list)

@@ -67,6 +67,8 @@ def study_identity(scenario: Scenario | TuneScenario, kind: str | None = None) -
         spec = scenario.diagnose
         if spec.model is not None:
             asked["diagnose.package"] = digest_of_folder(spec.package, MODELICA)
+            if spec.model.endswith(".mo"):
+                asked["diagnose.model"] = digest_of_text(Path(spec.model).read_text(encoding="utf-8"))
         if spec.catalogue is not None:
             asked["diagnose.catalogue"] = digest_of_folder(spec.catalogue, ["*.py"])
     return asked | _versions()

@@ -13,7 +13,7 @@ from pathlib import Path
 from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Variant
-from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, write_extended
+from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, source_beside, write_extended
 from thsa_cosim.diagnosis.catalogue.slots import find_slots
 from thsa_cosim.diagnosis.catalogue.superset import scales_of
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
@@ -89,7 +89,8 @@ class LawSearch:
         )
         name = f"{base.replace('.', '_')}_empirical"
         terms = candidates_of((EMPIRICAL,), slots, {})
-        source = extended_class(name, base, [*own, *terms], shapes)
+        beside = source_beside(self.spec.model, self.spec.package)
+        source = extended_class(name, base, [*own, *terms], shapes, beside=beside)
         file = write_extended(self.folder, name, source)
         fmu = export_fmu(
             str(file),

@@ -74,7 +74,7 @@ def test_a_dead_zone_moves_the_constant() -> None:
     force = friction()
     found = only(off_published([fitted(force - 200.0 * np.sign(force))], ()))
     assert "F_c at -30 degC" in found.text
-    assert "-10 % off its published law" in found.text
+    assert "where its published law says 2000 (-10 %, " in found.text
 
 
 def test_several_temperatures_are_one_finding_at_the_surest() -> None:

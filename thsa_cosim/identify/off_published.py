@@ -68,10 +68,12 @@ def _finding(found: Sequence[tuple[float, int, Fitted]]) -> Finding:
     signals = " or ".join([residual.channel, *moving])
     expected, stderr = p.expected or np.nan, p.stderr or np.nan
     others = f" (the surest of {len(found)} temperatures)" if len(found) > 1 else ""
-    off, errors = f"{100.0 * (p.value / expected - 1.0):+.2g} %", f"{abs(p.value - expected) / stderr:.2g}"
+    away = 100.0 * (p.value / expected - 1.0)
+    off = f"{away:+.2g} %, " if abs(away) < 100.0 else ""
     text = (
-        f"{p.name} at {point.label}{others} is {p.value:.4g} {p.unit}, {off} off its published law ({errors} standard"
-        f" errors), though what the fit leaves is noise: another machine than the law's, or an error of {signals} that"
-        f" {p.name} takes up, such as a gain, a dead zone or a lag; calibrate before you use the value"
+        f"{p.name} at {point.label}{others} is {p.value:.4g} {p.unit} where its published law says {expected:.4g}"
+        f" ({off}{abs(p.value - expected) / stderr:.2g} standard errors), though what the fit leaves is noise: another"
+        f" machine than the law's, or an error of {signals} that {p.name} takes up, such as a gain, a dead zone or a"
+        " lag; calibrate before you use the value"
     )
     return Finding(residual.recording, residual.channel, KIND, "warning", text)

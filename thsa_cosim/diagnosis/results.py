@@ -176,11 +176,15 @@ class EquivalenceClass:
 
 @dataclass(frozen=True)
 class EmpiricalTerm:
-    """A term of an empirical law in a slot: v, z, N are the slot's speed, position and load."""
+    """A term of an empirical law in what a slot reads: v, z, N are speed, position and load, d the distance.
+
+    ``shapes``: what is fitted inside the term, by name.
+    """
 
     slot: str
     term: str
     coefficient: Value
+    shapes: Mapping[str, Value] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

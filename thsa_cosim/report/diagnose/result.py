@@ -175,6 +175,7 @@ def _law(law: EmpiricalLaw) -> dict[str, Any]:
                 "coefficient": t.coefficient.value,
                 "unit": t.coefficient.unit,
                 "stderr": t.coefficient.stderr,
+                "shapes": _values(t.shapes),
             }
             for t in law.terms
         ],

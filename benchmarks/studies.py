@@ -11,7 +11,8 @@ last; ``search/FMU`` leaves out import, report, and what it takes to start a Pyt
 first line is the floor: a Python that imports what any study needs, and one with NumPy alone. Of motor, screw and
 gearbox, `script_least_squares.py` then identifies the first ``--script-points`` temperatures from the same arrays;
 ``script/ours`` compares CPU seconds per temperature, ours with everything included; ``cost`` says by how much the
-script's final cost lies above ours, and the last figure how far its values lie from ours at most, in our standard errors. Of tunings with one set of
+script's final cost lies above ours, and the last figure how far its values lie from ours at most, in our standard
+errors. Of tunings with one set of
 gains, `script_tuning.py` searches until it has our final cost. EMPS needs DATA_EMPS.mat in ``../shared/emps``. A
 scenario without recordings, or whose command refuses it, is named with the reason.
 """

@@ -9,6 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from thsa_cosim import __version__
+from thsa_cosim.batch.memory import give_back
 from thsa_cosim.diagnosis.blackbox.prepare import BlackBox, wrap_black_box
 from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
@@ -99,6 +100,7 @@ def _diagnose(
 ) -> DiagnosisResult:
     """Everything after the folder was claimed."""
     say = study.place.say
+    give_back()  # what the inspection of the recordings took
     cases = [t.case for t in trials if t.part == "fit"]
     opening = partial(study.open_runner, scenario.simulation)
     tested: Superset | BlackBox
@@ -144,6 +146,7 @@ def _diagnose(
             machine=machine,
             say=say,
         )
+    give_back()  # what the search took
     if found is None:
         reason = next(iter(bench.failures), "no run succeeded")
         raise StudyError(f"{scenario.path}: the model with all effects cannot be simulated: {reason}")
@@ -207,6 +210,7 @@ class _Closing:
         law: EmpiricalLaw | None = None
         if verdict == "unexplained-structure" and self.box is None:
             self.study.place.say("looking for an empirical law")
+            give_back()
             search = LawSearch(
                 scenario, self.spec, self.trials, self.unknowns, self.known, accepted, after,
                 self.study.folder / WORK, self.study.open_runner,

@@ -258,16 +258,17 @@ def read_recording(
             path, signal, t[kept], numbers[kept], missing[kept], source.repair, driven=signal in driven
         )
         measured = numbers[kept]
+        written = column.values[kept]
         unit = targets.get(signal) or source.unit or column.unit or "1"
         held_here = source.interpolation == "hold"
         samples[signal] = Samples(
-            t[kept],
+            _shared(t[kept], [other.time for other in samples.values()]),
             measured,
             unit,
             mended.left_out,
             held_here,
             source.smooth == "mean",
-            column.values[kept],
+            _shared(written, [measured]),
         )
         repairs += mended.done
         if source.unwrap is not None:
@@ -298,7 +299,7 @@ def read_recording(
         if source.smooth == "mean":
             values[signal] = np.full(grid.shape, float(np.mean(numbers[kept])))
         elif source.shift == 0.0 and np.array_equal(t[kept], grid):
-            values[signal] = numbers[kept]
+            values[signal] = _shared(numbers[kept], [measured])
         else:
             held = frozenset((signal,)) if source.interpolation == "hold" else frozenset()
             values[signal] = Signals(t, {signal: numbers}, held=held).resample(grid - source.shift)[signal]
@@ -324,6 +325,11 @@ def read_recording(
 
 
 _TEMPERATURE = "\0temperature"
+
+
+def _shared(values: FloatArray, others: Sequence[FloatArray]) -> FloatArray:
+    """One of ``others`` that is the same, so that it is held once: a long recording has many equal columns."""
+    return next((other for other in others if np.array_equal(values, other, equal_nan=True)), values)
 
 
 def _own_times(

@@ -35,7 +35,7 @@ from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 from thsa_cosim.diagnosis.results import SeparatingExperiment
-from thsa_cosim.scenario.schema import LimitsTable
+from thsa_cosim.scenario.diagnose_schema import LimitsTable
 from thsa_cosim.signals import Signals
 from thsa_cosim.study import Case
 

@@ -3,8 +3,9 @@
     python benchmarks/fuzz.py [--kind scenario] [--count 500] [--seed 1] [--first 0] [--jobs 1] [--keep DIR]
 
 Every case must end before its deadline with exit code 0, 2 or 3, say what is wrong in one sentence, leave no
-traceback, no process and no temporary file, and write to its study folder alone. A case is drawn from its kind, the
-seed and its index: --first N --count 1 --keep DIR repeats one and keeps its folder. Exit code 1 if any misbehaved.
+traceback, no process and no temporary file, and write to its study folder alone (and compiled libraries to a cache of
+this run). A case is drawn from its kind, the seed and its index: --first N --count 1 --keep DIR repeats one and keeps
+its folder. Exit code 1 if any misbehaved.
 """
 
 import argparse
@@ -23,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from fuzzing.cases import FINISHED, KINDS, STUDY, Case, healthy_cases, make_case
 from fuzzing.material import write_material
-from fuzzing.sandbox import Trial, Verdict
+from fuzzing.sandbox import CACHE, Trial, Verdict
 
 
 def main() -> int:
@@ -49,6 +50,9 @@ def main() -> int:
     try:
         base = (arguments.keep or scratch).resolve()
         base.mkdir(parents=True, exist_ok=True)
+        os.environ[CACHE] = str(
+            scratch / "cache"
+        )  # the same run with a full cache of one's own and with an empty one
         material = scratch / "material"
         write_material(material)
         if broken := prepare(kinds, material, scratch, arguments.deadline):

@@ -259,6 +259,7 @@ def _cases(scenario: Scenario) -> list[tuple[Recording, str, Experiment]]:
                 time=communication_points(scenario, recording),
                 fixed={**fixed, **start, **recording.start},
                 tolerance=scenario.simulation.tolerance,
+                texts=scenario.texts,
             )
             cases.append((recording, role, experiment))
     return cases

@@ -84,9 +84,9 @@ def _section(table: type[Table], prefix: str, covered: set[object]) -> Iterator[
             shared.append(f"`{key}`")
             continue
         covered.add(known)
-        if inside is None:
+        if inside is None or _is_mixed(field.annotation):
             rows.append(_row(key, field, meaning(table, name)))
-        else:
+        if inside is not None:
             below.append((inside, f"{key}{between}."))
     if rows:
         yield "| key | type | default | meaning |\n|---|---|---|---|\n" + "\n".join(rows) + "\n"
@@ -94,6 +94,12 @@ def _section(table: type[Table], prefix: str, covered: set[object]) -> Iterator[
         yield f"As above: {', '.join(shared)}.\n"
     for inside, longer in below:
         yield from _section(inside, longer, covered)
+
+
+def _is_mixed(annotation: Any) -> bool:
+    """Whether the members of a table are plain values or tables."""
+    arguments = get_args(annotation)
+    return get_origin(annotation) is dict and len(get_args(arguments[1])) > 1
 
 
 def _owner(table: type[Table], name: str) -> type:
@@ -146,6 +152,8 @@ def _type(annotation: Any, metadata: list[Any]) -> str:
         return f"table of {_plural(_type(arguments[1], []))}"
     if arguments:
         return " or ".join(_type(a, metadata) for a in arguments if a is not NoneType)
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return "table"
     limits = []
     for limit in metadata:
         for kind, sign, name in ((Gt, ">", "gt"), (Ge, "≥", "ge"), (Lt, "<", "lt"), (Le, "≤", "le")):

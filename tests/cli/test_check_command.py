@@ -7,6 +7,9 @@ import pytest
 from fmu_sources import build
 
 from thsa_cosim.cli import run_command
+from thsa_cosim.fmu import read_description
+from thsa_cosim.fmu.probe import facts
+from thsa_cosim.report.check import states
 
 ROOT = Path(__file__).parents[2]
 
@@ -46,10 +49,23 @@ def test_options_of_an_fmu_and_the_exit_code_of_a_failed_one(
     report = json.loads(capsys.readouterr().out)
     runs = next(line for line in report["findings"] if line["name"] == "runs")
     assert "0.5 s in 100 steps" in runs["text"]
+    assert (report["facts"]["state_names"], report["facts"]["started_states"]) == (["y"], ["y"])
     assert run_command(["check", str(build.lag2("CRASH_INSTANTIATE")), "--json"]) == 3
     assert json.loads(capsys.readouterr().out)["verdict"] == "failed"
     assert run_command(["check", str(build.lag2()), "--start", "tau"]) == 2
     assert "no NAME=VALUE" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("fmu", "says"),
+    [
+        ("EMPS", "s, w; these take a start value: controller.difference.z, controller.hold.z"),
+        ("Motor", "motor.w_m, motor.phi; each takes a start value"),
+        ("BrushlessMotor", "2: omega, i_m; none takes a start value"),
+    ],
+)
+def test_states_are_listed_with_those_that_take_a_start_value(fmu: str, says: str) -> None:
+    assert states(facts(read_description(ROOT / f"fmus/{fmu}.fmu"))).endswith(says)
 
 
 def test_what_is_not_there_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,6 +13,8 @@ from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu import Plant, read_description
 from thsa_cosim.fmu.archive import sha256_of, unpack
 
+ROOT = Path(__file__).parents[2]
+
 
 def test_fmi2_description_holds_what_the_xml_says() -> None:
     d = read_description(build.lag2())
@@ -52,6 +54,20 @@ def test_fmi1_description() -> None:
     d = read_description(build.lag1())
     assert d.fmi_version == "1.0"
     assert d.variables["tau"].causality == "parameter"
+
+
+def test_states_are_named_by_the_variable_that_takes_a_start_value() -> None:
+    motor = read_description(ROOT / "fmus/Motor.fmu")
+    shared = {v.name for v in motor.variables.values() if v.value_reference == motor.state_references[3][0]}
+    assert {"motor.friction.v", "motor.w_m"} <= shared  # one state, several names
+    assert motor.state_names[2:] == ("motor.i_q", "motor.w_m", "motor.phi")
+    emps = read_description(ROOT / "fmus/EMPS.fmu")
+    assert [n for n in emps.state_names if emps.variables[n].takes_start] == [
+        "controller.difference.z",
+        "controller.hold.z",
+    ]
+    assert read_description(build.lag2()).state_names == ("y",)
+    assert read_description(build.lag1()).state_names == ()  # FMI 1 does not say
 
 
 def test_description_can_be_pickled() -> None:

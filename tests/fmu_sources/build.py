@@ -316,6 +316,55 @@ HABITS2 = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
+TEXTS1 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="1.0" modelName="Texts" modelIdentifier="texts" guid="{texts}"
+  numberOfContinuousStates="0" numberOfEventIndicators="0">
+ <ModelVariables>
+  <ScalarVariable name="y" valueReference="0" causality="output"><Real/></ScalarVariable>
+  <ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
+  <ScalarVariable name="curve" valueReference="0" variability="parameter"><String start="flat"/></ScalarVariable>
+  <ScalarVariable name="mode" valueReference="1" causality="input" variability="discrete"><String start="once"/>
+  </ScalarVariable>
+ </ModelVariables>
+ {interface}
+</fmiModelDescription>
+"""
+
+TEXTS2 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Texts" guid="{texts}" generationTool="a tool">
+ <CoSimulation modelIdentifier="texts" canHandleVariableCommunicationStepSize="true"/>
+ <DefaultExperiment startTime="0" stopTime="1" stepSize="0.01"/>
+ <ModelVariables>
+  <ScalarVariable name="y" valueReference="0" causality="output"><Real/></ScalarVariable>
+  <ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
+  <ScalarVariable name="curve" valueReference="0" causality="parameter" variability="fixed"><String start="flat"/>
+  </ScalarVariable>
+  <ScalarVariable name="mode" valueReference="1" causality="input" variability="discrete"><String start="once"/>
+  </ScalarVariable>
+  <ScalarVariable name="gain" valueReference="2" causality="parameter" variability="fixed"><Real start="1"/>
+  </ScalarVariable>
+ </ModelVariables>
+ <ModelStructure><Outputs><Unknown index="1"/></Outputs><InitialUnknowns><Unknown index="1"/></InitialUnknowns>
+ </ModelStructure>
+</fmiModelDescription>
+"""
+
+TEXTS3 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="Texts" instantiationToken="{texts}" generationTool="a tool">
+ <CoSimulation modelIdentifier="texts" canHandleVariableCommunicationStepSize="true"/>
+ <DefaultExperiment startTime="0" stopTime="1" stepSize="0.01"/>
+ <ModelVariables>
+  <Float64 name="time" valueReference="9" causality="independent" variability="continuous"/>
+  <Float64 name="y" valueReference="0" causality="output"/>
+  <Float64 name="u" valueReference="1" causality="input" start="0"/>
+  <String name="curve" valueReference="2" causality="parameter" variability="fixed"><Start value="flat"/></String>
+  <String name="mode" valueReference="3" causality="input" variability="discrete"><Start value="once"/></String>
+ </ModelVariables>
+ <ModelStructure><Output valueReference="0"/><InitialUnknown valueReference="0"/></ModelStructure>
+</fmiModelDescription>
+"""
+
+
 def compiler() -> list[str] | None:
     """Return a C compiler's command, or None if there is none."""
     for name in ("gcc", "cc", "clang"):
@@ -413,6 +462,22 @@ def events2() -> Path:
 def lag1() -> Path:
     """The first-order lag of lag1.c, FMI 1.0 Co-Simulation."""
     return write_fmu(_folder() / "lag1.fmu", LAG1, library("lag1.c"), "lag1")
+
+
+@cache
+def texts(version: str) -> Path:
+    """The FMU with texts of texts.c: FMI "1" (Co-Simulation), "1 exchange", "2" or "3"."""
+    simulation = (
+        '<Implementation><CoSimulation_StandAlone><Capabilities canHandleVariableCommunicationStepSize="true"/>'
+        "</CoSimulation_StandAlone></Implementation>"
+    )
+    exchange = "exchange" in version
+    first = TEXTS1.replace("{interface}", "" if exchange else simulation)
+    xml = {"1": first, "2": TEXTS2, "3": TEXTS3}[version[0]]
+    curves = {"resources/steep.txt": b"7", "resources/Steigung für μ.txt": b"11"}
+    return write_fmu(
+        _folder() / f"texts{version}.fmu", xml, library("texts.c", f"FMI={version[0]}"), "texts", curves
+    )
 
 
 @cache

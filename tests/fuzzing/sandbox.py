@@ -25,6 +25,8 @@ from thsa_cosim.cli import run_command
 
 MARK = "THSA_COSIM_FUZZ"
 """Environment variable by which processes that a case has left behind are found."""
+CACHE = "THSA_COSIM_CACHE"
+"""Environment variable with the folder of compiled libraries, which a case may write to where it is set."""
 MEMORY_BYTES = 4 << 30
 LONGEST_SENTENCE = 1500
 Command = Callable[[list[str]], int]
@@ -189,7 +191,9 @@ def _run(command: Command, case: Case, aside: Path) -> None:
         tempfile.tempdir = str(aside / "tmp")
         os.environ.update({"TMPDIR": tempfile.tempdir, MARK: case.name, "PYTHONDONTWRITEBYTECODE": "1"})
         os.chdir(case.folder)
-        _note_writing_but_in((case.folder / STUDY, aside), aside / "written")
+        cache = os.environ.get(CACHE)
+        kept = (Path(cache),) if cache else ()
+        _note_writing_but_in((case.folder / STUDY, aside, *kept), aside / "written")
         sys.argv = ["thsa-cosim", *case.arguments]
         code = command(list(case.arguments))
         sys.stdout.flush()

@@ -1,6 +1,7 @@
 """The fuzzer: what it would notice, that its cases repeat, and a small sample of it (``benchmarks/fuzz.py``)."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -35,11 +36,12 @@ def temporary(_): Path(os.environ["TMPDIR"], "left").touch(); return 0
 def nan(_): Path("study").mkdir(); Path("study/result.json").write_text('{"a": NaN}'); return 0
 def warn(_): print("x.py:1: RuntimeWarning: overflow", file=sys.stderr); return 0
 def good(_): Path("study").mkdir(); Path("study/result.json").write_text("{}"); return 0
+def keep(_): Path(os.environ["THSA_COSIM_CACHE"], "library.so").touch(); return 0
 def sorry(_): print("error: no such key.", file=sys.stderr); return 2
 
 found = {}
 for command in (hang, crash, fault, trace, mute, talk, code, litter, elsewhere, change, orphan, temporary, nan, warn,
-                good, sorry):
+                good, keep, sorry):
     folder = Path(sys.argv[1], command.__name__)
     folder.mkdir()
     (folder / "input").write_text("a")
@@ -69,13 +71,14 @@ NOTICED = {
 
 
 def test_misbehaviour_is_noticed_and_good_behaviour_is_not(tmp_path: Path) -> None:
+    (cache := tmp_path / "cache").mkdir()
     done = subprocess.run(
-        [sys.executable, "-c", MISBEHAVING, str(tmp_path)],
+        [sys.executable, "-c", MISBEHAVING, str(tmp_path)], env={**os.environ, "THSA_COSIM_CACHE": str(cache)},
         capture_output=True, text=True, timeout=60, check=False, cwd=ROOT / "tests",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    assert found["good"] == found["sorry"] == []
+    assert found["good"] == found["keep"] == found["sorry"] == []
     for name, words in NOTICED.items():
         assert any(words in finding for finding in found[name]), (name, found[name])
 

@@ -60,6 +60,27 @@ def test_parameters_that_differ_in_another_way_doubt_no_sensor() -> None:
     assert fitted(1.0, {"F_c": 1800.0, "b": 3.4e5}) == []
 
 
+def test_a_gain_is_not_named_by_one_value_against_another() -> None:
+    # A speed that reads 5 % too much, with most of the viscous friction declared: b alone takes it up.
+    read, noise = 1.05 * SPEED, 60.0
+    columns = np.column_stack((np.sign(read), read))
+    declared = DRAWN["b"] * read
+    force = (
+        2000.0 * np.sign(SPEED) + DRAWN["b"] * SPEED + np.random.default_rng(3).normal(0.0, noise, SPEED.size)
+    )
+    value, *_ = np.linalg.lstsq(columns, force - declared, rcond=None)
+    stderr = noise * np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
+    simulated = declared + columns @ value
+    left, time = (simulated - force) / noise, np.arange(SPEED.size) * 1e-2
+    residual = Residual("run", "F", left, noise, "N", {}, time, simulated, columns / noise)
+    known = [
+        Expected(name, "", float(v), float(s), drawn, 1.0)
+        for name, v, s, drawn in zip(DRAWN, value, stderr, (2000.0, 1.0), strict=True)
+    ]
+    assert known[1].value == pytest.approx(-14286.0, rel=0.1)
+    assert list(hidden_gains([residual], known)) == []
+
+
 def test_a_delay_is_no_finding_below_what_the_sampling_makes() -> None:
     time = np.arange(1000) * 1e-3
     slow = np.sin(time)

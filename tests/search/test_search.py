@@ -17,6 +17,7 @@ from thsa_cosim.search import (
     profile,
     with_given,
 )
+from thsa_cosim.search.uncertainty import SOLVER_NOISE, Uncertainty
 
 TIME = np.linspace(0.0, 10.0, 2000)
 TRUE = np.array([0.5, 0.3, 0.4])
@@ -386,3 +387,33 @@ def test_a_slope_that_the_noise_of_the_solver_hides_is_said_to_be_hidden() -> No
         found.best, found.residual, found.jacobian, found.jacobian_error, [[slice(0, 3000)]], ["a", "b"]
     )
     assert all("solver noise" in reason for reason in sure.reasons)
+
+
+def sure_of(hidden: float, overlap: float) -> Uncertainty:
+    """Two slopes that ``overlap``; the error of the first is ``hidden`` times its size, of the second a thousandth."""
+    rng = np.random.default_rng(3)
+    plain, other, doubt = np.linalg.qr(rng.normal(size=(400, 3)))[0].T
+    jacobian = 100.0 * np.column_stack((plain, overlap * plain + np.sqrt(1.0 - overlap**2) * other))
+    error = 100.0 * np.column_stack((hidden * doubt, 1e-3 * doubt))
+    residual = rng.normal(size=400)
+    return estimate_uncertainty(
+        np.array([0.4, 0.6]), residual, jacobian, error, [[slice(0, 400)]], ["a", "b"]
+    )
+
+
+def test_a_slope_that_is_hidden_takes_no_other_with_it() -> None:
+    """As on two FMUs of Dymola: one column of nothing but jumps, and no parameter at all had a standard error."""
+    sure = sure_of(hidden=1.5, overlap=0.0)
+    assert sure.reasons == (SOLVER_NOISE, "")
+    assert np.isnan(sure.stderr[0])
+    assert sure.stderr[1] == pytest.approx(0.01, rel=0.15)
+
+
+def test_noise_of_the_solver_is_no_combination_of_parameters() -> None:
+    """Slopes at right angles cannot be mistaken for each other, whatever the noise does to them."""
+    assert sure_of(hidden=0.4, overlap=0.0).reasons == (SOLVER_NOISE, SOLVER_NOISE)
+
+
+def test_a_combination_is_no_noise_of_the_solver() -> None:
+    sure = sure_of(hidden=1e-3, overlap=1.0 - 1e-8)
+    assert all("determine only a combination" in reason for reason in sure.reasons)

@@ -156,6 +156,15 @@ def test_an_edited_file_is_another_study(folder: Path, key: str) -> None:
     assert changed(before, study_identity(loaded(folder, diagnosis()))) == [key]
 
 
+def test_an_edited_class_beside_the_scenario_is_another_study(folder: Path) -> None:
+    (folder / "Mine.mo").write_text("model Mine end Mine;")
+    data = diagnosis()
+    data["diagnose"]["model"] = "Mine.mo"
+    before = study_identity(loaded(folder, data))
+    edit(folder / "Mine.mo", "model Mine", "model Mine Real x = 1;")
+    assert changed(before, study_identity(loaded(folder, data))) == ["diagnose.model"]
+
+
 def test_another_fmu_is_another_study(folder: Path) -> None:
     before = study_identity(loaded(folder, valid()))
     with zipfile.ZipFile(folder / "Small.fmu", "a") as archive:

@@ -68,6 +68,17 @@ def table4() -> dict[str, Any]:
     return {key: value for key, value in data.items() if key not in ("surface", "line")}
 
 
+def driven(folder: Path) -> dict[str, Any]:
+    """A diagnosis of 2.5 s of two recordings, with one effect to try."""
+    data = shipped("driven.toml")
+    for role in ("fit", "validate"):
+        table = pd.read_parquet(SCENARIOS / "recordings" / f"undeclared_{role}_1.parquet").head(2500)
+        table.to_parquet(folder / f"{role}.parquet")
+        data["recordings"][role] = [str(folder / f"{role}.parquet")]
+    data["diagnose"] |= {"effects": ["windage"], "package": str(ROOT / "modelica" / "THSA"), "most": 1}
+    return data
+
+
 def simulated() -> dict[str, Any]:
     return screw("differential-evolution") | {"kind": "identify"}
 
@@ -165,40 +176,41 @@ def test_what_was_run_is_not_run_again(tmp_path: Path, monkeypatch: pytest.Monke
     assert 0 < sum(counts) < 0.5 * undisturbed
 
 
+class Runs:
+    """Counts the outcomes of all runs; from the ``limit``-th on something ``happens`` after each."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.ran, self.limit, self.happens = 0, 10**9, kill
+        plain = LocalRunner.run
+
+        def counted(runner: Any, jobs: Any, on_outcome: Any = None) -> Any:
+            def note(index: int, outcome: Any) -> None:
+                if on_outcome is not None:
+                    on_outcome(index, outcome)
+                self.ran += 1
+                if self.ran >= self.limit:
+                    self.happens()
+
+            return plain(runner, jobs, note)
+
+        monkeypatch.setattr(LocalRunner, "run", counted)
+
+
 @pytest.mark.nightly
 def test_a_diagnosis_that_is_killed_ends_like_the_undisturbed_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Killed at ten random runs: each attempt recalls what the ones before have run."""
-    data = shipped("driven.toml")
-    for role in ("fit", "validate"):
-        table = pd.read_parquet(SCENARIOS / "recordings" / f"undeclared_{role}_1.parquet").head(2500)
-        table.to_parquet(tmp_path / f"{role}.parquet")
-        data["recordings"][role] = [str(tmp_path / f"{role}.parquet")]
-    data["diagnose"] |= {"effects": ["windage"], "package": str(ROOT / "modelica" / "THSA"), "most": 1}
-    ran, limit, plain = 0, 10**9, LocalRunner.run
-
-    def counted(self: Any, jobs: Any, on_outcome: Any = None) -> Any:
-        def note(index: int, outcome: Any) -> None:
-            nonlocal ran
-            if on_outcome is not None:
-                on_outcome(index, outcome)
-            ran += 1
-            if ran >= limit:
-                raise Killed
-
-        return plain(self, jobs, note)
-
-    monkeypatch.setattr(LocalRunner, "run", counted)
+    data, runs = driven(tmp_path), Runs(monkeypatch)
     whole, _ = run("diagnose", data, tmp_path / "whole")
-    total, chance = ran, random.Random(4)
+    total, chance = runs.ran, random.Random(4)
     for _ in range(10):
-        ran, limit = 0, chance.randrange(1, total // 4)
+        runs.ran, runs.limit = 0, chance.randrange(1, total // 4)
         with contextlib.suppress(Killed):
             run("diagnose", data, tmp_path / "cut")
-    ran, limit = 0, 10**9
+    runs.ran, runs.limit = 0, 10**9
     cut, _ = run("diagnose", data, tmp_path / "cut")
-    assert ran < total
+    assert runs.ran < total
     assert json.loads(json.dumps(cut).replace("/cut/", "/whole/")) == whole
 
 
@@ -235,42 +247,76 @@ def swept(monkeypatch: pytest.MonkeyPatch, temporary: Path) -> Callable[[], None
     return sweep
 
 
+def rows_of(study: Path) -> set[str]:
+    """The rows of a study's journal, which holds no times."""
+    journal = study / "journal.csv"
+    return set(journal.read_text(encoding="utf-8").splitlines()) if journal.exists() else set()
+
+
 FAULTS = {"full": (full, "is full"), "noexec": (noexec, "noexec"), "swept": (swept, "removed while")}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_machines_fault_stops_the_study_and_leaves_no_row(fault: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("study", ["identify, evolution", "tune"])
+def test_a_machines_fault_stops_the_study_and_leaves_no_row(study: str, fault: str, tmp_path: Path) -> None:
     """The sentence names the temporary folder; the same command after the repair ends right."""
     begin, says = FAULTS[fault]
-    data, temporary = screw("differential-evolution"), tmp_path / "temporary"
+    command, build = STUDIES[study]
+    data, temporary = build(), tmp_path / "temporary"
     temporary.mkdir()
-    whole, told = run("identify", data, tmp_path / "whole")
+    whole, told = run(command, data, tmp_path / "whole")
     with pytest.MonkeyPatch.context() as broken:
         broken.setattr(tempfile, "tempdir", str(temporary))
         happens = begin(broken, temporary)
         with pytest.raises(MachineError, match=says) as caught:
-            run("identify", data, tmp_path / "cut", told // 2, happens)
+            run(command, data, tmp_path / "cut", told // 2, happens)
         assert str(temporary) in str(caught.value)
         assert "same command again" in str(caught.value)
-    journal = tmp_path / "cut" / "journal.csv"
-    rows = journal.read_text().splitlines()[1:] if journal.exists() else []
-    assert not [row for row in rows if "inf" in row]
-    assert run("identify", data, tmp_path / "cut")[0] == whole
+    assert rows_of(tmp_path / "cut") <= rows_of(tmp_path / "whole")
+    assert run(command, data, tmp_path / "cut")[0] == whole
 
 
 @pytest.mark.nightly
+def test_a_swept_temporary_folder_stops_a_diagnosis(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    data, runs, temporary = driven(tmp_path), Runs(monkeypatch), tmp_path / "temporary"
+    temporary.mkdir()
+    whole, _ = run("diagnose", data, tmp_path / "whole")
+    runs.ran, runs.limit, runs.happens = 0, runs.ran // 2, swept(monkeypatch, temporary)
+    with pytest.MonkeyPatch.context() as broken:
+        broken.setattr(tempfile, "tempdir", str(temporary))
+        with pytest.raises(MachineError, match="removed while") as caught:
+            run("diagnose", data, tmp_path / "cut")
+    assert str(temporary) in str(caught.value)
+    runs.limit = 10**9
+    cut, _ = run("diagnose", data, tmp_path / "cut")
+    assert json.loads(json.dumps(cut).replace("/cut/", "/whole/")) == whole
+
+
+#: What of a result says nothing of where the study was run.
+FOUND = {
+    "identify": ("points", "failures"),
+    "tune": ("gains", "before", "after", "failures"),
+    "diagnose": ("verdict", "effects", "before", "after", "candidates", "failures"),
+}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("kind", FOUND)
 @pytest.mark.parametrize(("options", "says"), [("size=1m", "is full"), ("noexec", "noexec")])
 def test_a_real_temporary_folder_that_is_full_or_noexec_stops_the_study(
-    options: str, says: str, tmp_path: Path
+    kind: str, options: str, says: str, tmp_path: Path
 ) -> None:
     """The same command, in a mounted folder that no FMU fits in or can be loaded from, and then elsewhere."""
     if shutil.which("unshare") is None or subprocess.run(["unshare", "-m", "true"], check=False).returncode:
         pytest.skip("mounting a folder of its own needs `unshare -m` (root)")
-    place, study, scenario = tmp_path / "place", tmp_path / "study", tmp_path / "screw.toml"
+    place, study, scenario = tmp_path / "place", tmp_path / "study", tmp_path / "asked.toml"
     place.mkdir()
-    scenario.write_text(toml(screw("differential-evolution")), encoding="utf-8")
-    command = f"{sys.executable} -m thsa_cosim.cli identify {scenario} -o {study} --workers 1 --quiet"
+    data = {"tune": table4, "diagnose": lambda: driven(tmp_path)}.get(
+        kind, lambda: screw("differential-evolution")
+    )()
+    scenario.write_text(toml(data), encoding="utf-8")
+    command = f"{sys.executable} -m thsa_cosim.cli {kind} {scenario} -o {study} --workers 1 --quiet"
     mounted = f"mount -t tmpfs -o {options} tmpfs {place} && TMPDIR={place} exec {command}"
     asked = ["unshare", "-m", "sh", "-c", mounted]
     done = subprocess.run(asked, capture_output=True, text=True, timeout=300, check=False, cwd=ROOT)
@@ -282,7 +328,7 @@ def test_a_real_temporary_folder_that_is_full_or_noexec_stops_the_study(
         command.split(), capture_output=True, text=True, timeout=300, check=False, cwd=ROOT
     )
     assert again.returncode == 0, again.stderr
-    whole = run("identify", screw("differential-evolution"), tmp_path / "whole")[0]
+    whole = run(kind, data, tmp_path / "whole")[0]
     found = without_times(json.loads((study / "result.json").read_text(encoding="utf-8")))
-    assert found["points"] == whole["points"]
-    assert found["failures"] == whole["failures"] == {}
+    assert {key: found[key] for key in FOUND[kind]} == {key: whole[key] for key in FOUND[kind]}
+    assert found["failures"] == {}

@@ -69,6 +69,8 @@ class Experiment:
     """Applied in the worker, so that signals need not travel; see ``Outcome.reduced``."""
     input_mode: str | None = None
     """How linear inputs are given in Co-Simulation (``fmu.inputs.MODES``); None: as trusted without a trial."""
+    texts: Mapping[str, str] = field(default_factory=dict)
+    """Start values of the FMU's String parameters and inputs."""
     wrapper: Wrapper | None = None
     """Runs the FMU in place of a plain simulation; jobs may set its parameters like those of the FMU."""
 

@@ -55,10 +55,12 @@ def wrapper_names(experiments: Sequence[Experiment]) -> dict[str, frozenset[str]
 def check_experiment(experiment: Experiment, description: FmuDescription) -> None:
     """FmuError or ParameterError if an experiment names variables that its FMU lacks."""
     from thsa_cosim.fmu.inputs import communication_grid, input_variables
+    from thsa_cosim.fmu.texts import check_texts
 
     own = experiment.wrapper_names
     for name in (*experiment.outputs, *(n for n in experiment.fixed if n not in own)):
         description.variable(name)
+    check_texts(experiment.texts, description)
     input_variables(description, experiment.inputs)
     communication_grid(experiment.time)
 

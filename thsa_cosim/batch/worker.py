@@ -221,6 +221,7 @@ class Worker:
             self._plants[folder] = plant
         self._live = plant
         plant.input_mode = experiment.input_mode
+        plant.texts = experiment.texts
         return experiment, plant
 
     def _watch_memory(self) -> None:

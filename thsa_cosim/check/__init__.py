@@ -56,7 +56,7 @@ def check_fmu(
         line of the report.
     """
     description = read_description(path)
-    given = excitation or Excitation(dict(values or {}), inputs, time)
+    given = excitation or Excitation(dict(values or {}), inputs=inputs, time=time)
     _check_names(description, given)
     trials = Trials(description, given, deadline_s, on_finding)
     trials.description_lines()

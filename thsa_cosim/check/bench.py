@@ -96,6 +96,7 @@ class Bench:
             self._values,
             tolerance=self._given.tolerance,
             input_mode=self._mode if self._kind == "co-simulation" else None,
+            texts=self._given.texts,
         )
 
     def _runner(

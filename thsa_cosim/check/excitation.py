@@ -14,6 +14,8 @@ class Excitation:
 
     values: Mapping[str, float] = field(default_factory=dict)
     """Start values, in the FMU's units."""
+    texts: Mapping[str, str] = field(default_factory=dict)
+    """Start values of String parameters and inputs."""
     inputs: Signals | None = None
     time: FloatArray | None = None
     """(n,) s, communication points."""

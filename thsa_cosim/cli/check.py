@@ -36,7 +36,9 @@ FAILED = 3
 @click.option(
     "--deadline", type=POSITIVE, default=30.0, show_default=True, help="FMU: longest time of a run, s."
 )
-@click.option("--start", "starts", multiple=True, metavar="NAME=VALUE", help="FMU: a start value.")
+@click.option(
+    "--start", "starts", multiple=True, metavar="NAME=VALUE", help="FMU: a start value, a number or a text."
+)
 @click.option("--input", "ends", multiple=True, metavar="NAME=VALUE", help="FMU: final value of an input.")
 @click.option(
     "--sensitivity",
@@ -68,7 +70,8 @@ def check(
         from thsa_cosim.fmu.sources import compile_sources
 
         path = compile_sources(path, compiled)
-    given = {"duration": duration, "step": step, "values": _pairs(starts), "ends": _pairs(ends)}
+    values, texts = _start_values(path, starts)
+    given = {"duration": duration, "step": step, "values": values, "texts": texts, "ends": _pairs(ends)}
     points = _sensitivities(path) if sensitivity else ()
     content, show = _checked(path, given, deadline)
     if points:
@@ -81,6 +84,19 @@ def check(
     else:
         show(console())
     return FAILED if content["verdict"] == "failed" else 0
+
+
+def _start_values(path: Path, starts: tuple[str, ...]) -> tuple[dict[str, float], dict[str, str]]:
+    """Start values of numbers, and those of the FMU's String variables."""
+    from thsa_cosim.recordings import SUFFIXES
+    from thsa_cosim.system import read_description
+
+    if not starts or path.suffix.lower() in (".toml", *SUFFIXES):
+        return _pairs(starts), {}
+    strings = {v.name for v in read_description(path).variables.values() if v.type == "String"}
+    split = [start.partition("=") for start in starts]
+    texts = {name.strip(): text for name, _, text in split if name.strip() in strings}
+    return _pairs(tuple(s for s in starts if s.partition("=")[0].strip() not in strings)), texts
 
 
 def _pairs(texts: tuple[str, ...]) -> dict[str, float]:
@@ -228,8 +244,9 @@ def _fmu_of(loaded: "Scenario | StagedScenario | TuneScenario", deadline: float)
         experiment.fmu,
         excitation=Excitation(
             values,
-            experiment.inputs,
-            experiment.time,
+            texts=experiment.texts,
+            inputs=experiment.inputs,
+            time=experiment.time,
             parameters=searched,
             tolerance=spec.tolerance,
             kind=spec.interface,

@@ -6,6 +6,7 @@ Four rooms, each of which knows only those before it, and ``run`` on top:
 ``fitting``: a model's unknowns fitted to recordings; what is left beside noise.
 ``choosing``: which candidates the recordings ask for: screened, scored on held-out recordings, gated, judged.
 ``explaining``: what else the recordings say: balances, dependence, empirical laws, the next experiment.
+``conclusion``: the extended model identified as the declared one was, and the verdict. ``run`` goes through all.
 
 ``blackbox`` offers the catalogue's effects to an FMU without source; ``results`` is what all of it comes to.
 """

@@ -181,7 +181,10 @@ class Builder:
                 )
                 self._simplify(row, FlatEquation(reference, variable.binding, variable.place))
         dependent = self._dependent_values()
-        initial_equations = [(self._translated(e), str(e)) for e in self.split.initial_equations]
+        initial_equations = [
+            (self._translated(e), f"{e} ({e.place})" if e.place else str(e))
+            for e in self.split.initial_equations
+        ]
         self._updates()
         reinits = [(r, self._at(r.place, r.condition), self._at(r.place, r.value)) for r in self.flat.reinits]
         asserted = [self._assertion(a) for a in self.flat.assertions]
@@ -228,6 +231,8 @@ class Builder:
             w=algebraic,
             outputs=outputs,
             g=indicators,
+            relations=tuple(translate.relations),
+            pivots=system.pivots,
             g_start=first_indicators(self, indicators, x, initial),
             g_simplified=simplified_indicators(self, initial),
             dependent=dependent,

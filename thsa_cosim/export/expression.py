@@ -42,6 +42,7 @@ _BINARY: dict[str, Callable[[ca.SX, ca.SX], ca.SX]] = {
     "or": ca.logic_or,
     "atan2": ca.atan2,
 }
+_DEPTH = 4  # of terms in messages
 _RELATIONS = frozenset(("<", "<=", ">", ">="))
 _WHOLE = frozenset(("floor", "ceil", "integer", "div", "mod", "rem"))
 
@@ -105,7 +106,7 @@ class Translator:
 
     ``symbols`` maps names to CasADi symbols or values; ``derivatives`` maps names to the symbols of their time
     derivatives; ``discrete`` names the symbols (parameters, constants) whose relations need no event. ``inline``
-    holds Boolean and Integer variables by their defining expression.
+    holds Boolean and Integer variables by their defining expression. ``relations`` are the texts of the modes.
     """
 
     symbols: dict[str, ca.SX]
@@ -115,6 +116,7 @@ class Translator:
     memory: Memory = field(default_factory=Memory)
     modes: list[ca.SX] = field(default_factory=list)
     indicators: list[ca.SX] = field(default_factory=list)
+    relations: list[str] = field(default_factory=list)
     _done: dict[tuple[int, bool], ca.SX] = field(default_factory=dict)
     _kept: list[Term] = field(default_factory=list)
     _pending: set[str] = field(default_factory=set)
@@ -144,7 +146,7 @@ class Translator:
             return _UNARY[op](self.real(args[0], events))
         if op in _RELATIONS:
             a, b = (self.real(x, events) for x in args)
-            return self._ordered(op, a, b, events)
+            return self._ordered(op, a, b, events, _shown(op, *args))
         if op in ("==", "<>"):
             return self._equal(op, *(self.real(x, events) for x in args), events=events)
         if op == "if":
@@ -157,11 +159,11 @@ class Translator:
         if op in ("start", "smooth"):
             return self.real(args[-1], events)
         if op in ("max", "min", "abs", "sign"):
-            return self._kinked(op, [self.real(a, events) for a in args], events)
+            return self._kinked(term, events)
         if op == "der":
             return self._derivative(args[0], events)
         if op in _WHOLE:
-            return self._rounded(op, [self.real(a, events) for a in args], events)
+            return self._rounded(op, [self.real(a, events) for a in args], events, text(term, _DEPTH))
         return self._discrete(term)
 
     def _discrete(self, term: Term) -> ca.SX:
@@ -187,22 +189,23 @@ class Translator:
         held = self.memory.symbols() | {str(mode) for mode in self.modes}
         return all(str(s) in self.discrete or str(s) in held for s in ca.symvar(expression))
 
-    def _ordered(self, op: str, a: ca.SX, b: ca.SX, events: bool) -> ca.SX:
+    def _ordered(self, op: str, a: ca.SX, b: ca.SX, events: bool, shown: str) -> ca.SX:
         difference = a - b if op in (">", "<=") else b - a
         if not events or self._timeless(difference):
             inclusive = op in ("<=", ">=")
             side = -difference if inclusive else difference
             return side >= 0 if inclusive else side > 0
-        mode = self._mode(difference)
+        mode = self._mode(difference, shown)
         return ca.logic_not(mode) if op in ("<=", ">=") else mode
 
-    def _mode(self, difference: ca.SX) -> ca.SX:
+    def _mode(self, difference: ca.SX, shown: str) -> ca.SX:
         for mode, indicator in zip(self.modes, self.indicators, strict=True):
             if ca.is_equal(indicator, difference, 20):
                 return mode
         mode = ca.SX.sym(f"mode({len(self.modes)})")
         self.modes.append(mode)
         self.indicators.append(difference)
+        self.relations.append(shown)
         return mode
 
     def _equal(self, op: str, a: ca.SX, b: ca.SX, *, events: bool) -> ca.SX:
@@ -274,20 +277,21 @@ class Translator:
         self.memory.samples.append((start, interval, tick))
         return tick
 
-    def _rounded(self, op: str, values: list[ca.SX], events: bool) -> ca.SX:
+    def _rounded(self, op: str, values: list[ca.SX], events: bool, shown: str) -> ca.SX:
         if op in ("floor", "integer"):
-            return self._floor(values[0], events)
+            return self._floor(values[0], events, shown)
         if op == "ceil":
-            return -self._floor(-values[0], events)
+            return -self._floor(-values[0], events, shown)
         a, b = values
         quotient = a / b
         if op == "mod":
-            return a - self._floor(quotient, events) * b
-        above = self._ordered(">=", quotient, ca.SX(0), events)
-        whole = select(above, self._floor(quotient, events), -self._floor(-quotient, events))
+            return a - self._floor(quotient, events, shown) * b
+        above = self._ordered(">=", quotient, ca.SX(0), events, f"sign of {shown}")
+        up, down = self._floor(quotient, events, shown), -self._floor(-quotient, events, shown)
+        whole = select(above, up, down)
         return whole if op == "div" else a - whole * b
 
-    def _floor(self, value: ca.SX, events: bool) -> ca.SX:
+    def _floor(self, value: ca.SX, events: bool, shown: str) -> ca.SX:
         """The largest whole number not above the value; a discrete variable whose steps are events."""
         if not events or self._timeless(value):
             return ca.floor(value)
@@ -297,25 +301,32 @@ class Translator:
         name = f"_floor[{len(self.memory.names) + 1}]"
         now = self.memory.add(name)
         self._floors.append((value, now))
-        above = ca.logic_not(self._mode(now + 1 - value))
-        below = self._mode(now - value)
+        above = ca.logic_not(self._mode(now + 1 - value, f"step of {shown}"))
+        below = self._mode(now - value, f"step of {shown}")
         step = select(
             above, ca.fmax(now + 1, ca.floor(value)), select(below, ca.fmin(now - 1, ca.floor(value)), now)
         )
         self.memory.updates[name] = select(self.memory.is_initial(), ca.floor(value), step)
         return now
 
-    def _kinked(self, function: str, values: list[ca.SX], events: bool) -> ca.SX:
-        first, second = values if len(values) == 2 else (values[0], ca.SX(0))
-        above = self._ordered(">", first, second, events)
+    def _kinked(self, term: Term, events: bool) -> ca.SX:
+        function, args = term.op, (*term.args, 0.0)[:2]
+        first, second = (self.real(a, events) for a in args)
+        above = self._ordered(">", first, second, events, _shown(">", *args))
         if function == "max":
             return select(above, first, second)
         if function == "min":
             return select(above, second, first)
         if function == "abs":
             return select(above, first, -first)
-        below = self._ordered(">", -first, ca.SX(0), events)
+        below = self._ordered(">", -first, ca.SX(0), events, _shown("<", *args))
         return above - below
+
+
+def _shown(op: str, a: Scalar, b: Scalar) -> str:
+    """A relation as its mode has it, for messages: that of ``a >= b`` holds where a < b."""
+    strict = {">=": "<", "<=": ">"}.get(op, op)
+    return f"{text(a, _DEPTH)} {strict} {text(b, _DEPTH)}"
 
 
 def select(condition: ca.SX, yes: ca.SX, no: ca.SX) -> ca.SX:

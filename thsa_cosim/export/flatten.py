@@ -10,6 +10,7 @@ from thsa_cosim.modelica.flat import Experiment, FlatEquation, FlatModel, FlatVa
 from thsa_cosim.modelica.flatten import flatten_class
 from thsa_cosim.modelica.library import Library, unversioned
 from thsa_cosim.modelica.syntax import ClassDefinition, Component, Extends
+from thsa_cosim.shipped import shipped
 
 __all__ = [
     "Experiment",
@@ -143,11 +144,16 @@ def _search(package: Path, libraries: Sequence[Path]) -> list[Path]:
     return [*own, *libraries, *(p for p in environment if p.exists())]
 
 
+def _with_shipped(search: Sequence[Path]) -> list[Path]:
+    """Behind all others the package THSA that is shipped: a drive of one's own is built from its blocks."""
+    return [*search, shipped("modelica", "THSA")]
+
+
 def _find(model: str, package: Path, libraries: Sequence[Path]) -> tuple[Library, Path, str]:
     search = _search(package, libraries)
     if model.endswith(".mo"):
-        return _of_file(Path(model), search)
-    library = Library(search)
+        return _of_file(Path(model), _with_shipped(search))
+    library = Library(_with_shipped(search) if search else [])
     names = [model]
     own = unversioned(package.name)
     if (package / "package.mo").is_file() and model.split(".")[0] != own:

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
+from thsa_cosim.export.block import Block
 from thsa_cosim.export.emit import statements
 from thsa_cosim.export.graph import Graph
 from thsa_cosim.export.model import CausalModel, column
-from thsa_cosim.export.solve import HOMOTOPY, Block
+from thsa_cosim.export.solve import HOMOTOPY
 
 STEPS = 20  # of the way from the simplified to the actual initial system
 
@@ -58,6 +59,11 @@ class Implicit:
         self.homotopy = any(str(s) == HOMOTOPY for b in model.initial_blocks for s in ca.symvar(b.residual))
         if self.homotopy:  # how far the system is simplified lies behind its unknowns
             self.symbols[HOMOTOPY] = f"y0[{offset}]"
+
+    @property
+    def loops(self) -> int:
+        """Number of loops that `unsolved` can name; the last is all loops of the running model at once."""
+        return len(self.model.blocks) + len(self.model.initial_blocks) + bool(self.size)
 
     def total(self, function: ca.SX, over: ca.SX, rates: ca.SX) -> ca.SX:
         """Jacobian of a function with y following."""
@@ -106,9 +112,18 @@ class Implicit:
         self, graph: Graph, symbols: dict[str, str], cached: dict[int, str], own: int, refresh: bool
     ) -> list[str]:
         """Functions that the others call."""
-        if not self.size and not self.initial_size:
+        if not self.loops:
             return []
-        lines = ['#include "newton.h"', ""]
+        lines = [
+            '#include "newton.h"',
+            "",
+            "/* Notes the loop that has no solution, for messages; 0 = all have one. */",
+            "static int unsolved(const double *d, int loop) {",
+            "  ((double *)d)[N_D + N_CACHE - 1] = loop;",
+            "  return loop;",
+            "}",
+            "",
+        ]
         if self.size:
             lines += [
                 f"static double *implicit_of(const double *d) {{ return (double *)d + N_D + {own}; }}",
@@ -149,15 +164,17 @@ class Implicit:
         return [f"  double work[{largest * (largest + 4)}];", f"  int pivot[{largest}];"]
 
     @staticmethod
-    def _calls(blocks: tuple[Block, ...], prefix: str, y: str) -> list[str]:
+    def _calls(blocks: tuple[Block, ...], prefix: str, y: str, first: int) -> list[str]:
+        """Calls of the loops, which ``unsolved`` numbers from ``first`` on."""
         lines, offset = [], 0
         for k, block in enumerate(blocks):
             n, part = block.unknown.numel(), f"{y} + {offset}"
             if block.linear:
                 direct = f"{prefix}{k}(&at, {part}, work) || newton_linear({n}, 1, work, {part}, pivot)"
-                lines.append(f"  if ({direct}) return 1;")
+                lines.append(f"  if ({direct}) return unsolved(d, {first + k});")
             else:
-                lines.append(f"  if (newton_solve({n}, {part}, {prefix}{k}, &at, work, pivot)) return 1;")
+                call = f"newton_solve({n}, {part}, {prefix}{k}, &at, work, pivot)"
+                lines.append(f"  if ({call}) return unsolved(d, {first + k});")
             offset += n
         return lines
 
@@ -172,8 +189,8 @@ class Implicit:
             "  double *v = implicit_of(d);",
             "  const Point at = {t, x, u, p, d, m, v};",
             *self._declared(self.model.blocks),
-            *self._calls(self.model.blocks, "block_", "v"),
-            "  return 0;",
+            *self._calls(self.model.blocks, "block_", "v", 1),
+            "  return unsolved(d, 0);",
             "}",
             "",
         ]
@@ -203,9 +220,9 @@ class Implicit:
                 if self.homotopy
                 else []
             ),
-            *self._calls(self.model.initial_blocks, "initial_block_", "y0"),
+            *self._calls(self.model.initial_blocks, "initial_block_", "y0", 1 + len(self.model.blocks)),
             *(["  }"] if self.homotopy else []),
-            "  return 0;",
+            "  return unsolved(d, 0);",
             "}",
             "",
         ]
@@ -256,7 +273,7 @@ class Implicit:
                 "  (void)t; (void)x; (void)u; (void)p; (void)d; (void)m; (void)v;",
                 *(["  (void)sx; (void)su; (void)sp;"] if arguments else []),
                 *statements(graph, outputs, symbols, {}),
-                f"  return newton_linear({n}, {columns}, R, S, pivot);",
+                f"  return unsolved(d, newton_linear({n}, {columns}, R, S, pivot) ? {self.loops} : 0);",
                 "}",
                 "",
             ]

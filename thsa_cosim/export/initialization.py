@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
+from thsa_cosim.export.block import Block
 from thsa_cosim.export.model import column
-from thsa_cosim.export.solve import Block
 
 if TYPE_CHECKING:
     from thsa_cosim.export.causal import Builder

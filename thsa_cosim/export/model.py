@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 
-from thsa_cosim.export.solve import Block
+from thsa_cosim.export.block import Block, Pivot
 from thsa_cosim.modelica.flat import FlatModel
 
 
@@ -86,6 +86,8 @@ class CausalModel:
     assertions: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     domain: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # nonzero where a function leaves its domain
     domain_texts: tuple[str, ...] = ()
+    relations: tuple[str, ...] = ()  # what holds where g > 0, as text
+    pivots: tuple[Pivot, ...] = ()
 
     @property
     def y(self) -> ca.SX:

@@ -2,30 +2,15 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import casadi as ca
-import numpy as np
 
 from thsa_cosim.errors import ModelicaError
+from thsa_cosim.export.block import Block, BlockSolver, Pivot
 from thsa_cosim.export.structure import Incidence, blocks, match, reduce_index
 
-LARGEST_SYMBOLIC = 3
 STABILIZATION = 10.0  # 1/s
 HOMOTOPY = "homotopy()"  # name of the symbol that goes from 1 (simplified) to 0 (actual)
-
-
-@dataclass(frozen=True)
-class Block:
-    """Equations that are solved while the model runs: ``residual(unknown) = 0``, by Newton's method from the last
-    solution, or ``linear`` ones directly, which leaves no rounding noise where the solution is exactly 0.
-    """
-
-    names: tuple[str, ...]
-    unknown: ca.SX
-    residual: ca.SX
-    guess: ca.SX
-    linear: bool = False
 
 
 class EquationSystem:
@@ -47,6 +32,7 @@ class EquationSystem:
         self._preference: dict[str, tuple[int, ...]] = {}
         self._derivatives: dict[str, str] = {}
         self.blocks: tuple[Block, ...] = ()
+        self.pivots: tuple[Pivot, ...] = ()
         self.simplified: dict[int, ca.SX] = {}  # residuals with homotopy, by equation; their path is HOMOTOPY
         self._full: tuple[list[ca.SX], list[str]] = ([], [])
 
@@ -171,9 +157,9 @@ class EquationSystem:
 
     def solve(self, model: str) -> dict[str, ca.SX]:
         """Every unknown that is no state, in terms of states, inputs, parameters, modes, time and ``blocks``."""
-        solver = _Solver(self, self._rows, self.residuals, self.labels, model)
+        solver = BlockSolver(self, self._rows, self.residuals, self.labels, model)
         solution = solver.solve(self._matching)
-        self.blocks = tuple(solver.blocks)
+        self.blocks, self.pivots = tuple(solver.blocks), tuple(solver.pivots)
         return solution
 
     def solve_initial(
@@ -238,7 +224,7 @@ class EquationSystem:
         for row, residual in self.simplified.items():
             residuals[row] = residual
             rows[row] = rows[row] | self.incidence(residual)
-        solver = _Solver(self, rows, residuals, labels, model, guesses)
+        solver = BlockSolver(self, rows, residuals, labels, model, guesses)
         solution = solver.solve(matching)
         if self.simplified:
             path = [s for r in self.simplified.values() for s in ca.symvar(r) if str(s) == HOMOTOPY][:1]
@@ -286,128 +272,3 @@ class EquationSystem:
             raise ModelicaError(f"{model}: too few equations: nothing determines {self.names[free[0]]}.")
         if spare:
             raise ModelicaError(f"{model}: too many equations: {self.labels[spare[0]]} is one too many.")
-
-
-class _Solver:
-    """Solves the blocks of one system in their order."""
-
-    def __init__(
-        self,
-        system: EquationSystem,
-        rows: Incidence,
-        residuals: list[ca.SX],
-        labels: list[str],
-        model: str,
-        guesses: dict[str, ca.SX] | None = None,
-    ) -> None:
-        self.system, self.rows, self.residuals, self.labels = system, rows, residuals, labels
-        self.model, self.guesses = model, guesses
-        self.solution: dict[str, ca.SX] = {}
-        self.blocks: list[Block] = []
-
-    def solve(self, matching: dict[int, int]) -> dict[str, ca.SX]:
-        """Name → expression for every matched unknown."""
-        system, rows = self.system, self.rows
-        for block in blocks(rows, matching):
-            known = {system.names[c] for r, _ in block for c in rows[r]} & self.solution.keys()
-            symbols, values = [system.symbols[n] for n in known], [self.solution[n] for n in known]
-            residual = ca.vertcat(*ca.substitute([self.residuals[r] for r, _ in block], symbols, values))
-            names = [system.names[c] for _, c in block]
-            listed = "; ".join(self.labels[r] for r, _ in block[:4])
-            self._solve(residual, names, listed)
-        return self.solution
-
-    def _solve(self, residual: ca.SX, names: list[str], listed: str) -> None:
-        unknown = ca.vertcat(*[self.system.symbols[n] for n in names])
-        matrix = ca.jacobian(residual, unknown)
-        linear = not ca.depends_on(matrix, unknown)
-        if linear and self._singular(matrix):
-            given = "" if matrix.is_constant() else " with the parameters as they are"
-            raise ModelicaError(
-                f"{self.model}: singular{given}: {', '.join(names[:6])} cannot be solved from {listed}."
-            )
-        if linear and len(names) <= LARGEST_SYMBOLIC:
-            constant = ca.substitute([residual], [unknown], [ca.SX.zeros(len(names))])[0]
-            self.solution.update(zip(names, ca.vertsplit(_linear_solve(matrix, constant)), strict=True))
-            return
-        eliminated, residual, rest = _torn(residual, names, self.system.symbols)
-        if rest:
-            self._reduced(residual, rest, linear)
-        symbols = [self.system.symbols[n] for n in rest]
-        values = [self.solution[n] for n in rest]
-        for name, expression in reversed(eliminated):
-            self.solution[name] = ca.substitute([expression], symbols, values)[0]
-            symbols.append(self.system.symbols[name])
-            values.append(self.solution[name])
-
-    def _singular(self, matrix: ca.SX) -> bool:
-        """Whether a matrix of numbers and parameters has no inverse; False where it depends on anything else."""
-        symbols = ca.symvar(matrix)
-        values = [v for v in (self.system.parameter(str(symbol)) for symbol in symbols) if v is not None]
-        if len(values) < len(symbols):
-            return False
-        numbers = np.array(ca.evalf(ca.substitute(matrix, ca.vertcat(*symbols), ca.vertcat(*values))))
-        return not np.isfinite(numbers).all() or bool(np.linalg.matrix_rank(numbers) < len(numbers))
-
-    def _reduced(self, residual: ca.SX, names: list[str], linear: bool) -> None:
-        unknown = ca.vertcat(*[self.system.symbols[n] for n in names])
-        if linear and len(names) <= LARGEST_SYMBOLIC:
-            matrix = ca.jacobian(residual, unknown)
-            constant = ca.substitute([residual], [unknown], [ca.SX.zeros(len(names))])[0]
-            self.solution.update(zip(names, ca.vertsplit(_linear_solve(matrix, constant)), strict=True))
-            return
-        word = "implicit" if self.guesses is None else "initially"
-        fresh = [ca.SX.sym(f"{word}({n})") for n in names]
-        residual = ca.substitute([residual], [unknown], [ca.vertcat(*fresh)])[0]
-        self.solution.update(zip(names, fresh, strict=True))
-        guess = [self.guesses.get(n, ca.SX(0)) if self.guesses else ca.SX(0) for n in names]
-        self.blocks.append(Block(tuple(names), ca.vertcat(*fresh), residual, ca.vertcat(*guess), linear))
-
-
-def _torn(
-    residual: ca.SX, names: list[str], symbols: dict[str, ca.SX]
-) -> tuple[list[tuple[str, ca.SX]], ca.SX, list[str]]:
-    """Eliminate unknowns that an equation gives explicitly, with a constant coefficient.
-
-    Returns the eliminated ones in order, each in terms of those that come after it and of the rest; the residual that
-    is left, and the names of the rest.
-    """
-    rows = ca.vertsplit(residual)
-    rest = list(names)
-    eliminated: list[tuple[str, ca.SX]] = []
-    while len(rows) > 1:
-        found = _explicit(rows, rest, symbols)
-        if found is None:
-            break
-        row, name, value = found
-        rows.pop(row)
-        rest.remove(name)
-        rows = ca.substitute(rows, [symbols[name]], [value])
-        eliminated.append((name, value))
-    return eliminated, ca.vertcat(*rows), rest
-
-
-def _explicit(
-    rows: list[ca.SX], names: list[str], symbols: dict[str, ca.SX]
-) -> tuple[int, str, ca.SX] | None:
-    unknown = {str(symbols[n]): n for n in names}
-    counted = []
-    for index, row in enumerate(rows):
-        present = [unknown[str(s)] for s in ca.symvar(row) if str(s) in unknown]
-        counted.append((len(present), index, present))
-    for _, index, present in sorted(counted):
-        for name in present:
-            slope = ca.jacobian(rows[index], symbols[name])
-            if slope.is_constant() and abs(float(slope)) > 1e-12:
-                rest = ca.substitute([rows[index]], [symbols[name]], [ca.SX(0)])[0]
-                return index, name, -rest / float(slope)
-    return None
-
-
-def _linear_solve(matrix: ca.SX, constant: ca.SX) -> ca.SX:
-    """x with matrix x + constant = 0."""
-    if matrix.numel() == 1:
-        if matrix.is_constant() and float(matrix) in (1.0, -1.0):
-            return -constant if float(matrix) == 1.0 else constant
-        return -constant / matrix
-    return -ca.mtimes(ca.inv_minor(ca.densify(matrix)), constant)

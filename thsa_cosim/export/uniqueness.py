@@ -11,8 +11,8 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 
+from thsa_cosim.export.block import Block
 from thsa_cosim.export.graph import Graph
-from thsa_cosim.export.solve import Block
 
 _RELATIONS = frozenset((ca.OP_LT, ca.OP_LE))
 _MOST_RELATIONS = 8

@@ -9,7 +9,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -115,6 +115,10 @@ class ApartInstance(Instance):
     def set_start(self, channels: Sequence[Channel], values: FloatArray) -> None:
         """Set start values of a new or reset instance."""
         self.ask("set_start", list(channels), values)
+
+    def set_texts(self, texts: Mapping[int, str]) -> None:
+        """Set String variables of a new or reset instance."""
+        self.ask("set_texts", dict(texts))
 
     def initialize_end(self) -> None:
         """Leave Initialization Mode."""

@@ -84,6 +84,12 @@ class Variable:
         return self.type in FLOAT_TYPES
 
     @property
+    def takes_start(self) -> bool:
+        """Whether a local variable or an output, such as a state, takes a start value (FMI 2.0.4, clause 2.2.7)."""
+        started = self.causality in ("local", "output") and self.initial in ("exact", "approx")
+        return started and self.variability != "constant"
+
+    @property
     def may_stay_open(self) -> bool:
         """Whether it is an input that needs no signal: a temperature that starts below absolute zero."""
         zero = _ABSOLUTE_ZERO.get(self.unit or "")
@@ -149,6 +155,17 @@ class FmuDescription:
             for v in self.variables.values()
             if v.causality in ("parameter", "structuralParameter") and (v.is_scalar or v.is_alias)
         )
+
+    @cached_property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the continuous states, in the order of the state vector; empty if the FMU does not state them all.
+
+        Where variables share a state, the one that takes a start value names it.
+        """
+        floats = [v for v in self.variables.values() if v.is_float]
+        by_reference = {v.value_reference: v.name for v in sorted(floats, key=lambda v: v.takes_start)}
+        names = tuple(by_reference.get(state, "") for state, _ in self.state_references)
+        return names if all(names) and len(names) == self.states else ()
 
     @cached_property
     def structural_references(self) -> frozenset[int]:

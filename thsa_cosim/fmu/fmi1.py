@@ -21,7 +21,7 @@ _STATUS = {2: Status.FMI_DISCARD, 4: Status.FMI_FATAL}
 def run_fmi1(
     folder: Path,
     description: FmuDescription,
-    values: Mapping[str, float],
+    values: Mapping[str, float | str],
     inputs: Signals | None,
     outputs: Sequence[str],
     time: FloatArray,
@@ -35,7 +35,8 @@ def run_fmi1(
     driven = input_variables(description, inputs)
     recorded = [description.variable(name) for name in outputs]
     start = [description.variable(name) for name in values]
-    for variable in (*driven, *recorded, *start):
+    texts = [name for name, value in values.items() if isinstance(value, str)]
+    for variable in (*driven, *recorded, *(v for v in start if v.name not in texts)):
         if variable.type not in _TYPES:
             raise ParameterError(
                 f"{description.path}: {variable.name} is of type {variable.type}, no number."
@@ -104,6 +105,9 @@ def run_fmi1(
 
 def _set(slave: Any, variables: Sequence[Variable], values: Any) -> None:
     for variable, value in zip(variables, values, strict=True):
+        if isinstance(value, str):
+            slave.setString([variable.value_reference], [value])
+            continue
         kind = _TYPES[variable.type]
         value = -value if _is_negated(variable) else value
         number: Any = float(value) if kind == "Real" else bool(value) if kind == "Boolean" else int(value)

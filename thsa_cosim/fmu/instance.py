@@ -2,7 +2,7 @@
 
 import ctypes
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -92,6 +92,7 @@ class Instance(ABC):
         self.input_mode: str | None = None
         """How linear inputs are given, see ``inputs.input_mode``; None: as trusted."""
         self._start: tuple[Sequence[Channel], FloatArray] = (), np.empty(0)
+        self._texts: Mapping[int, str] = {}
         self.is_dead = False
         """After fmiXFatal nothing may be called any more, not even FreeInstance."""
 
@@ -204,6 +205,21 @@ class Instance(ABC):
     def set_start_again(self) -> None:
         """Set the start values a second time, where the FMI still allows all of them."""
         self.set_values(*self._start)
+        self._set_strings()
+
+    def set_texts(self, texts: Mapping[int, str]) -> None:
+        """Set String variables of a new or reset instance by value reference; like ``set_start``."""
+        self._texts = texts
+        self._set_strings()
+
+    def _set_strings(self) -> None:
+        if not self._texts:
+            return
+        references = np.array(list(self._texts), dtype=np.uint32)
+        data = (ctypes.c_char_p * len(references))(*(text.encode() for text in self._texts.values()))
+        function = self.value_function("Set", "String")
+        code = self.access(function, references.ctypes.data, len(references), ctypes.addressof(data))
+        self.check(code, "SetString")
 
     def initialize_end(self) -> None:
         """Leave Initialization Mode."""

@@ -22,6 +22,7 @@ from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.fmi2 import Fmi2Instance
 from thsa_cosim.fmu.fmi3 import Fmi3Instance
 from thsa_cosim.fmu.instance import Channel, Instance
+from thsa_cosim.fmu.texts import check_texts
 from thsa_cosim.signals import FloatArray
 
 _STEP = 1e-6
@@ -67,22 +68,15 @@ class OpenLoop:
 
 def state_names(description: FmuDescription) -> tuple[str, ...]:
     """Names of the continuous states, in the order of the state vector; FmuError if they are not stated."""
-    # Looked up for every run: the last description's names are kept.
-    if _last_names and _last_names[-1][0] is description:
-        return _last_names[-1][1]
-    by_reference = {v.value_reference: v.name for v in description.variables.values() if v.is_float}
-    names = tuple(by_reference.get(state, "") for state, _ in description.state_references)
-    if not names or not all(names) or len(names) != description.states:
+    if not description.state_names:
         raise FmuError(
             f"{description.path} does not say which variables its states are; it cannot be linearised."
         )
-    _last_names[:] = [(description, names)]
-    return names
+    return description.state_names
 
 
 _refusing: set[str] = set()
 """Digests of FMUs that do not give every derivative themselves: an instance that refused a call is not used again."""
-_last_names: list[tuple[FmuDescription, tuple[str, ...]]] = []
 
 
 def open_loop(
@@ -95,6 +89,7 @@ def open_loop(
     states: FloatArray,
     signal: str,
     gains: Sequence[str],
+    texts: Mapping[str, str] | None = None,
 ) -> OpenLoop:
     """Linearise at ``states`` (n,) and open the loop at ``signal``.
 
@@ -108,6 +103,8 @@ def open_loop(
         Simulated time of that state, s.
     gains
         Parameters that act through ``signal`` alone; the one that moves it most is used.
+    texts
+        Start values of String variables by name.
 
     Raises
     ------
@@ -118,7 +115,7 @@ def open_loop(
     """
     names = state_names(description)
     if description.sha256 not in _refusing:
-        with _Point(description, folder, values, inputs, time, states, signal) as point:
+        with _Point(description, folder, values, inputs, time, states, signal, texts) as point:
             try:
                 exact = _exact(point, states, gains, values)
             except SimulationFailure:
@@ -127,7 +124,7 @@ def open_loop(
         if exact is not None:
             a, b, c = exact
             return OpenLoop(names, a - np.outer(b, c), b, c, "directional")
-    with _Point(description, folder, values, inputs, time, states, signal) as point:
+    with _Point(description, folder, values, inputs, time, states, signal, texts) as point:
         size = np.maximum(np.abs(states), point.nominal())
         steps = _STEP * size
         probes = [states] + [
@@ -147,13 +144,13 @@ def open_loop(
     for group in ([states], moved):
         base = here[:1]
         if group is moved:
-            with _Point(description, folder, values, inputs, time, states, signal) as point:
+            with _Point(description, folder, values, inputs, time, states, signal, texts) as point:
                 base = [point.evaluate(x) for x in group]
         enough = _ENOUGH * max(1.0, abs(float(base[0][-1])))
         for name in gains:
             value = values[name]
             changed = {**values, name: value * (1.0 + _GAIN_STEP) if value else _GAIN_STEP}
-            with _Point(description, folder, changed, inputs, time, states, signal) as point:
+            with _Point(description, folder, changed, inputs, time, states, signal, texts) as point:
                 found = [point.evaluate(x) - before for x, before in zip(group, base, strict=True)]
             best = max([best, *(f for f in found if np.isfinite(f).all())], key=lambda f: abs(float(f[-1])))
             if abs(best[-1]) > enough:
@@ -212,6 +209,7 @@ class _Point:
         time: float,
         states: FloatArray,
         signal: str,
+        texts: Mapping[str, str] | None,
     ) -> None:
         cls = Fmi2Instance if description.fmi_version == "2.0" else Fmi3Instance
         self._instance: Instance = cls(folder, description, "model-exchange")
@@ -221,7 +219,7 @@ class _Point:
         self.description = description
         self._signal: list[Channel] = []
         try:
-            self._begin(values, inputs, time, states, signal)
+            self._begin(values, inputs, time, states, signal, texts or {})
         except BaseException:
             self._instance.free()
             raise
@@ -233,10 +231,12 @@ class _Point:
         time: float,
         states: FloatArray,
         signal: str,
+        texts: Mapping[str, str],
     ) -> None:
         instance, description = self._instance, self.description
         instance.instantiate()
         _set(instance, values)
+        instance.set_texts(check_texts(texts, description))
         instance.initialize_begin(0.0, max(time, 1.0), None)
         _set(instance, inputs)
         instance.initialize_end()

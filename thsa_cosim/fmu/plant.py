@@ -23,6 +23,7 @@ from thsa_cosim.fmu.native import MessageSink
 from thsa_cosim.fmu.plan import Plan
 from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.fmu.stepping import check_names, step_through
+from thsa_cosim.fmu.texts import check_texts
 from thsa_cosim.fmu.trajectory import follow, is_expected, is_offered, solver_tolerance
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -87,6 +88,8 @@ class Plant(Closing):
         self._update: IntermediateUpdate | None = None
         self.input_mode: str | None = None
         """How linear inputs are given in Co-Simulation, one of ``inputs.MODES``; None: as trusted."""
+        self.texts: Mapping[str, str] = {}
+        """Start values of String parameters and inputs by name, for every run."""
 
     @classmethod
     def open(
@@ -187,7 +190,9 @@ class Plant(Closing):
             from thsa_cosim.fmu.fmi1 import run_fmi1
 
             mode = self.input_mode or "mean"
-            return run_fmi1(self.folder, self.description, values, inputs, outputs, time, self.progress, mode)
+            given: dict[str, float | str] = {**values, **self.texts}
+            check_texts(self.texts, self.description)
+            return run_fmi1(self.folder, self.description, given, inputs, outputs, time, self.progress, mode)
         points = self._points(time)
         try:
             result = self._run(values, inputs, outputs, points, tolerance, once)
@@ -252,6 +257,7 @@ class Plant(Closing):
                 self._update.block[1] = instance.handle
         self.progress[0] = Phase.INITIALIZE
         instance.set_start(settable, np.fromiter((float(values[n]) for n in names), float, len(names)))
+        instance.set_texts(check_texts(self.texts, self.description))
         start, stop = float(plan.grid.times[0]), plan.grid.stop
         if self.kind == "model-exchange":
             from thsa_cosim.fmu.exchange import integrate

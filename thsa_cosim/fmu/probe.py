@@ -35,6 +35,10 @@ class Facts:
     """Names by role: input, output, parameter (fixed), tunable parameter."""
     other_variables: int
     states: int
+    state_names: tuple[str, ...]
+    """In the order of the state vector; empty if the FMU does not name them."""
+    started_states: tuple[str, ...]
+    """Those that can be given a start value."""
     event_indicators: int
 
     def to_dict(self) -> dict[str, Any]:
@@ -49,6 +53,8 @@ class Facts:
             "variables": {role: list(names) for role, names in self.variables.items()},
             "other_variables": self.other_variables,
             "states": self.states,
+            "state_names": list(self.state_names),
+            "started_states": list(self.started_states),
             "event_indicators": self.event_indicators,
         }
 
@@ -75,6 +81,8 @@ def facts(description: FmuDescription) -> Facts:
         variables={role: tuple(v.name for v in members) for role, members in roles.items()},
         other_variables=len(description.variables) - sum(len(members) for members in roles.values()),
         states=description.states,
+        state_names=description.state_names,
+        started_states=tuple(n for n in description.state_names if description.variables[n].takes_start),
         event_indicators=description.event_indicators,
     )
 

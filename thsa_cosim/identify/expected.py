@@ -39,6 +39,7 @@ def expected_values(
                     parameter, point.temperature_degC, law, fmu, bool(zeroed.get(parameter.name))
                 ),
                 scale=scale,
+                published=law is not None and law.published is not None and law.compared_form is not None,
             )
         )
     return found

@@ -13,6 +13,7 @@ from thsa_cosim.errors import InputError, StudyError
 from thsa_cosim.identify.expected import expected_values
 from thsa_cosim.identify.force import force_balance
 from thsa_cosim.identify.off_law import off_law
+from thsa_cosim.identify.off_published import Fitted, off_published
 from thsa_cosim.identify.over_temperature import all_laws, values_at
 from thsa_cosim.identify.parameter_set import parameter_set
 from thsa_cosim.identify.point import PointSearch, search_point
@@ -26,6 +27,7 @@ from thsa_cosim.identify.problem import (
 )
 from thsa_cosim.identify.results import ForceBalance, IdentifyResult, LawResult, PointResult
 from thsa_cosim.identify.silent import note_on, silent_parameters
+from thsa_cosim.identify.unsettled import unsettled
 from thsa_cosim.inspection import (
     Expected,
     Finding,
@@ -256,6 +258,7 @@ class _Search:
         ]
         force, unsaid = self._force(comparisons, laws)
         slips = [*self._slips(), *self._labels(laws)]
+        findings = [*slips, *self._off_published(slips)]
         return IdentifyResult(
             title=title,
             status="interrupted" if self.interrupted else "complete",
@@ -275,10 +278,10 @@ class _Search:
             notes=(*scenario.notes, *failed, *notes, *left_out, *self._notes, *unsaid),
             settings={**scenario.search.model_dump(), "error": scenario.cost.error},
             force=force,
-            data=Inspection.of((*scenario.data.findings, *slips), scenario.data.repairs),
+            data=Inspection.of((*scenario.data.findings, *findings), scenario.data.repairs),
             trust=judge(
                 self._residuals(),
-                (*_reasons(slips), *self._undetermined(), *self._bounds(), *self._coupled()),
+                (*_reasons(slips), *unsettled(self._results(), scenario.search.polish), *self._coupled()),
             ),
             coupling=self._coupling,
         )
@@ -306,6 +309,15 @@ class _Search:
             found += slips + [f for f in hidden_gains(residuals, expected) if f.channel not in doubted]
         return [f for f in found if (f.recording, f.channel, f.kind) not in known]
 
+    def _off_published(self, slips: Sequence[Finding]) -> list[Finding]:
+        """Values off their published laws at points that nothing else casts a doubt on.
+
+        No reason against trust: what is left is noise, and a worn machine differs from its laws, too.
+        """
+        doubted = {f.recording for f in (*self._scenario.data.findings, *slips) if f.severity != "note"}
+        points = ((self._points[k].label, self._point_residuals(k), self._expected(k)) for k in self._found)
+        return off_published((Fitted(*point) for point in points), doubted)
+
     def _labels(self, laws: Mapping[str, LawResult]) -> list[Finding]:
         """Recordings whose temperature seems to be another one, by the laws through all points."""
         found = off_law(self._results(), laws)
@@ -330,25 +342,6 @@ class _Search:
 
     def _coupled(self) -> list[str]:
         return [] if self._coupling is None or not self._coupling.reason else [self._coupling.reason]
-
-    def _undetermined(self) -> list[str]:
-        """Points where no parameter is determined: whatever fits says nothing. Without a polish that is not known."""
-        if not self._scenario.search.polish:
-            return []
-        return [
-            f"the recordings determine no parameter at {point.label}: they are too short, or nothing in them shows it"
-            for point in self._results()
-            if point.parameters and not any(e.identifiable for e in point.parameters.values())
-        ]
-
-    def _bounds(self) -> list[str]:
-        """Parameters that ended on a bound: the fit would have gone on."""
-        return [
-            f"{name} lies on its {side} bound at {point.label}: the fit would have gone on"
-            for point in self._results()
-            for name, estimate in point.parameters.items()
-            if (side := estimate.on_bound)
-        ]
 
     def _force(
         self, comparisons: Sequence[Comparison], laws: Mapping[str, LawResult]

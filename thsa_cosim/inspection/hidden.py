@@ -22,6 +22,8 @@ _SURE = 5.0
 """Standard errors by which the gain has to differ from 1."""
 _LIKE = 0.9
 """Share of the parameters' distance from the drawing, as a sum of squares, that the gain has to account for."""
+_AGREES = 4.0
+"""Standard deviations, of the value and the drawing, up to which a parameter differs as the gain would make it."""
 _DRAWN = 0.01
 """How well a drawing is known, relative."""
 
@@ -31,6 +33,7 @@ class Expected:
     """An identified ``value`` with its ``stderr``, and what the drawing says (``expected``; None: nothing).
 
     ``scale``: change of the value per unit of the parameter's column in ``Residual.slopes``, in ``unit``.
+    ``published``: whether ``expected`` is a published law's, no start value.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Expected:
     stderr: float | None
     expected: float | None
     scale: float
+    published: bool = False
 
 
 def hidden_gains(residuals: Sequence[Residual], parameters: Sequence[Expected]) -> Iterator[Finding]:
@@ -82,6 +86,8 @@ def _gain(
     apart = float(np.sum(weight * away**2))
     if not _LEAST < abs(gain) < _MOST or gain * gain * power < _LIKE * apart:
         return None
+    if np.any(np.sqrt(weight) * np.abs(away - gain * effect) > _AGREES):
+        return None
     if abs(gain) * np.sqrt(float(np.sum(effect**2 / error**2))) < _SURE:
         return None
     return gain, [(p, gain * c) for p, c, _, s in known if abs(gain * c) > 2.0 * s]
@@ -91,7 +97,7 @@ def _finding(
     residuals: Sequence[Residual], channel: str, gain: float, taken: Sequence[tuple[Expected, float]]
 ) -> Finding:
     factor = 1.0 / (1.0 - gain)  # the values, and what follows from them, have it already
-    changes = " and ".join(f"{p.name} by {100.0 * change / (p.value - change):+.2g} %" for p, change in taken)
+    changes = " and ".join(f"{p.name} by {_change(p, change)}" for p, change in taken)
     text = (
         f"a gain of {factor:.3g} in the sensor of {channel} would leave no trace in this fit: it would change"
         f" {changes}, and that is how they differ from the expected values; calibrate {channel} before you use them"
@@ -102,3 +108,9 @@ def _finding(
         f"[recordings.columns.{channel}]\nscale = {1.0 / factor:.4g}  # only if a calibration confirms it"
     )
     return Finding(recording, channel, "gain", severity, text, (), remedy)
+
+
+def _change(parameter: Expected, change: float) -> str:
+    """A change as a share of what the value would be without it, of a value near zero in its unit."""
+    share = 100.0 * change / (parameter.value - change)
+    return f"{share:+.2g} %" if abs(share) < 100.0 else f"{change:+.2g} {parameter.unit}".rstrip()

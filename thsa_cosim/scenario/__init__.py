@@ -7,6 +7,7 @@ that the use cases get, ``load`` turns the one into the other, ``check`` holds a
 The ``tune_`` modules are the same for tunings, which need no recordings.
 """
 
+from thsa_cosim.scenario.diagnose_schema import BalanceTable
 from thsa_cosim.scenario.executor import Executor, Opening, OpenRunner
 from thsa_cosim.scenario.loading import AnyScenario, load
 from thsa_cosim.scenario.model import (
@@ -18,7 +19,6 @@ from thsa_cosim.scenario.model import (
 )
 from thsa_cosim.scenario.schema import (
     KINDS,
-    BalanceTable,
     ChannelTable,
     LawTable,
     SearchTable,

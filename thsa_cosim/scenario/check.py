@@ -8,16 +8,17 @@ from pathlib import Path
 from thsa_cosim.errors import ParameterError, ScenarioError, UnitError, did_you_mean, did_you_mean_path
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
+from thsa_cosim.scenario.diagnose_schema import DiagnoseOptionsTable
 from thsa_cosim.scenario.formula import parse_formula
 from thsa_cosim.scenario.model import BlackBoxSpec, DiagnoseSpec, ForceSpec
 from thsa_cosim.scenario.schema import (
     CommonTable,
-    DiagnoseOptionsTable,
     DiagnoseTable,
     IdentifyTable,
     ParameterTable,
     SimulateTable,
 )
+from thsa_cosim.scenario.table import FileTable
 from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.shipped import modelica_package
 from thsa_cosim.ssv import read_ssv
@@ -56,6 +57,8 @@ def roles(table: CommonTable, fmu: FmuDescription) -> tuple[tuple[str, ...], tup
     for name, column in columns.items():
         key = f"recordings.columns.{name}"
         variable = find_variable(fmu, name, key, fmu.inputs + fmu.outputs)
+        if variable.type == "String" and variable.causality in ("input", *_SETTABLE):
+            raise ScenarioError(f"{key} is a text of {fmu.path.name}, not a signal; give it in [fixed].")
         if variable.causality == "input":
             inputs.append(name)
         elif variable.causality in ("output", "local") and variable.type != "String":
@@ -198,11 +201,24 @@ def diagnosis(
         )
     return DiagnoseSpec.resolved(
         spec,
+        model=_class_of(path, spec.model),
         package=package,
         catalogue=own,
         spreads={p.name: spec.spread if p.spread is None else p.spread for p in table.parameters},
         blackbox=_black_box(path, spec, fmu),
     )
+
+
+def _class_of(path: Path, model: str | None) -> str | None:
+    """Return the class's name, or the path of the ``.mo`` file that holds it; ScenarioError without that file."""
+    if model is None or not model.endswith(".mo"):
+        return model
+    file = path.parent / model
+    if not file.is_file():
+        raise ScenarioError(
+            f"diagnose.model: there is no file {file}; correct the path.{did_you_mean_path(file)}"
+        )
+    return str(file)
 
 
 def _black_box(path: Path, spec: DiagnoseOptionsTable, fmu: FmuDescription) -> BlackBoxSpec | None:
@@ -235,8 +251,7 @@ def readable(fmu: FmuDescription, name: str, key: str) -> Variable:
 def settable(fmu: FmuDescription, name: str, key: str) -> Variable:
     """Return a variable that can be given a start value; ScenarioError otherwise."""
     variable = find_variable(fmu, name, key, fmu.parameters)
-    start_value = variable.initial in ("exact", "approx") and variable.causality in ("local", "output")
-    if variable.causality in _SETTABLE or (start_value and variable.variability != "constant"):
+    if variable.causality in _SETTABLE or variable.takes_start:
         return variable
     remedy = (
         f"give it in [recordings.columns.{name}]" if variable.causality == "input" else "choose a parameter"
@@ -273,7 +288,11 @@ def fixed(
     own: dict[str, float] = {}
     for name, value in table.fixed.items():
         key = f"fixed.{_quoted(name)}"
-        variable = settable(fmu, name, key)
+        variable = _start_value(fmu, name, value, key)
+        if isinstance(value, FileTable):
+            _is_file(value.path(path.parent), f"{key}.file")
+        if isinstance(value, str | FileTable):
+            continue
         check_range(variable, float(value), key, fmu)
         if name in searched:
             raise ScenarioError(f"{key} is searched for as parameter {searched[name]!r}; remove one of them.")
@@ -288,6 +307,33 @@ def fixed(
     zeros = {name: 0.0 for names in zeroed(table, fmu).values() for name in names}
     merged = {**values, **zeros, **own}
     return {name: value for name, value in merged.items() if name not in searched}
+
+
+def _start_value(fmu: FmuDescription, name: str, value: float | str | FileTable, key: str) -> Variable:
+    """Return the variable that ``[fixed]`` gives a start value of its type; ScenarioError otherwise."""
+    known = fmu.variables.get(name)
+    is_text = known is not None and known.type == "String" and not known.is_array
+    given = isinstance(value, str | FileTable)
+    if known is not None and is_text and known.causality == "input" and given:
+        return known  # a text has no course over time: it is given like a parameter
+    variable = settable(fmu, name, key)
+    if given and not is_text:
+        shown = value if isinstance(value, str) else value.file  # type: ignore[union-attr]
+        raise ScenarioError(
+            f"{key}: must be a number, not {shown!r}; {name!r} of {fmu.path.name} is of type {variable.type}."
+        )
+    if is_text and not given:
+        raise ScenarioError(
+            f"{key}: {name!r} of {fmu.path.name} is a text; give it in quotes, not {value!r}."
+        )
+    if isinstance(value, str) and "\0" in value:
+        raise ScenarioError(f"{key}: the text holds a null character; remove it.")
+    return variable
+
+
+def _is_file(file: Path, key: str) -> None:
+    if not file.is_file():
+        raise ScenarioError(f"{key}: there is no file {file}; correct the path.{did_you_mean_path(file)}")
 
 
 def zeroed(table: CommonTable | TuneTable, fmu: FmuDescription) -> dict[str, tuple[str, ...]]:

@@ -87,7 +87,9 @@ def _trial(
     own = experiment.wrapper_names
     fixed = {name: value for name, value in experiment.fixed.items() if name not in own}
     short = replace(experiment, time=experiment.time[: count + 1], fixed=fixed)
-    excitation = table.tobytes() + repr((sorted(fixed.items()), spec.tolerance)).encode()
+    excitation = (
+        table.tobytes() + repr((sorted(fixed.items()), dict(experiment.texts), spec.tolerance)).encode()
+    )
     key = description.sha256, experiment.name, tuple(experiment.outputs), len(short.time), excitation
     if key not in _trials:
         try:

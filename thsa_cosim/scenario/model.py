@@ -12,17 +12,16 @@ from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.inspection import Inspection, inspect
 from thsa_cosim.parameters import ParameterSpace
 from thsa_cosim.recordings import Recording
+from thsa_cosim.scenario.diagnose_schema import BlackBoxTable, DiagnoseOptionsTable
 from thsa_cosim.scenario.schema import (
-    BlackBoxTable,
     CommonTable,
     CostTable,
-    DiagnoseOptionsTable,
     ForceTable,
     LawTable,
     SearchTable,
     SimulationTable,
 )
-from thsa_cosim.scenario.table import Name
+from thsa_cosim.scenario.table import Name, start_texts
 from thsa_cosim.signals import Signals
 from thsa_cosim.system.description import SystemDescription
 
@@ -117,6 +116,11 @@ class Scenario:
         # a temperature that moves is what laws are searched by
         kept = (f for f in found.findings if f.kind != "temperature-drift")
         return Inspection.of(tuple(kept), found.repairs)
+
+    @property
+    def texts(self) -> Mapping[str, str]:
+        """Start values of the FMU's String parameters and inputs, of every run."""
+        return start_texts(self.path.parent, self.table.fixed)
 
     @property
     def file_units(self) -> Mapping[str, str | None]:

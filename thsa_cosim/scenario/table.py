@@ -1,5 +1,7 @@
 """What all tables of a scenario file have in common."""
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -53,6 +55,30 @@ class Table(BaseModel):
     def keys(cls) -> tuple[str, ...]:
         """Names of the keys as they stand in the file."""
         return tuple(field.alias or name for name, field in cls.model_fields.items())
+
+
+class FileTable(Table):
+    """``fixed.<variable> = { file = "table.txt" }``: a text that is the path of a file, which the FMU is to read."""
+
+    file: Name
+    """Relative to the scenario; the FMU gets the absolute path."""
+
+    def path(self, home: Path) -> Path:
+        """The file of a scenario in the folder ``home``."""
+        return (home / self.file).absolute()
+
+
+StartValue = float | bool | str | FileTable
+"""A number, a Boolean, or for a String variable a text."""
+
+
+def start_texts(home: Path, fixed: Mapping[str, StartValue]) -> dict[str, str]:
+    """Return the texts among start values; paths of files as an FMU gets them, of a scenario in the folder ``home``."""
+    return {
+        name: str(value.path(home)) if isinstance(value, FileTable) else value
+        for name, value in fixed.items()
+        if isinstance(value, str | FileTable)
+    }
 
 
 def check_order(start: float | None, stop: float | None) -> None:

@@ -19,6 +19,7 @@ from thsa_cosim.scenario.metrics_schema import (
     StartTable,
 )
 from thsa_cosim.scenario.schema import SearchTable, SimulationTable
+from thsa_cosim.scenario.table import start_texts
 from thsa_cosim.scenario.tune_schema import (
     LineTable,
     ParetoTable,
@@ -203,6 +204,11 @@ class TuneScenario:
     simulation: SimulationTable
     profiles: tuple[Profile, ...] = ()
     kind: str = "tune"
+
+    @property
+    def texts(self) -> Mapping[str, str]:
+        """Start values of the FMU's String parameters and inputs, of every run."""
+        return start_texts(self.path.parent, self.table.fixed)
 
     @cached_property
     def data(self) -> Inspection:

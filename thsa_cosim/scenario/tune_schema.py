@@ -16,7 +16,7 @@ from thsa_cosim.scenario.metrics_schema import (
 from thsa_cosim.scenario.recording_schema import ColumnTable, TimeTable
 from thsa_cosim.scenario.schema import EvolutionTable, SimulationTable
 from thsa_cosim.scenario.system_schema import ModelTable
-from thsa_cosim.scenario.table import Moderate, Name, NotNegative, Positive, Table
+from thsa_cosim.scenario.table import Moderate, Name, NotNegative, Positive, StartValue, Table
 
 
 class CommandTable(Table):
@@ -234,8 +234,9 @@ class TuneTable(ModelTable):
     """Of the search and of the parameter samples. ``--seed`` replaces it."""
     parameter_set: Name | None = None
     """Path of an SSV file with start values: the ``identified.ssv`` of a study."""
-    fixed: dict[Name, float | bool] = Field(default_factory=dict)
-    """Start values held in every run, by FMU variable, in the FMU's units; they win over ``parameter_set``.
+    fixed: dict[Name, StartValue] = Field(default_factory=dict)
+    """Start values held in every run, by FMU variable, in the FMU's units; they win over ``parameter_set``. A String
+    variable, be it a parameter or an input, gets a text in quotes, or the path of a file as ``{ file = "table.txt" }``.
     """
     command: CommandTable
     conditions: dict[Name, ConditionTable] = Field(default_factory=dict)

@@ -1,7 +1,7 @@
 """A recording as a simulation that a model has to match: what drives it, and what is compared."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ class Case:
     temperature_degC: float | None
     tolerance: float | None
     wrapper: Wrapper | None = None
+    texts: Mapping[str, str] = field(default_factory=dict)
 
     def experiment(self, name: str, reduce: Reducer | None) -> Experiment:
         """The simulation under ``name`` with what the worker makes of its signals."""
@@ -47,6 +48,7 @@ class Case:
             fixed=self.fixed,
             tolerance=self.tolerance,
             reduce=reduce,
+            texts=self.texts,
             wrapper=self.wrapper,
         )
 
@@ -89,6 +91,7 @@ def build_case(scenario: Scenario, recording: Recording, fixed: Mapping[str, flo
         measured=recording.compared.select(scenario.measured),
         temperature_degC=recording.temperature_degC,
         tolerance=scenario.simulation.tolerance,
+        texts=scenario.texts,
     )
 
 

@@ -30,6 +30,11 @@ def digest_of_folder(folder: Path, patterns: Iterable[str]) -> str:
     return digest.hexdigest()
 
 
+def digest_of_file(file: Path) -> str:
+    """SHA-256 of a file's content, hexadecimal; OSError if it cannot be read."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
 def digest_of_recording(recording: Recording) -> str:
     """SHA-256 of a recording as it is used: its samples after renaming, conversion and cutting."""
     digest = hashlib.sha256()

@@ -16,7 +16,8 @@ import numpy as np
 from thsa_cosim import __version__
 from thsa_cosim.recordings import Recording
 from thsa_cosim.scenario import Scenario, StagedScenario, Table, TuneScenario
-from thsa_cosim.study.digest import digest_of_folder, digest_of_recording, digest_of_text
+from thsa_cosim.scenario.table import FileTable
+from thsa_cosim.study.digest import digest_of_file, digest_of_folder, digest_of_recording, digest_of_text
 
 Identity = dict[str, Any]
 """What was asked: dotted key → plain JSON value; a key that is not given is not there."""
@@ -35,6 +36,7 @@ BY_CONTENT = {
     "recordings.fit": "digests of the samples that are used",
     "recordings.validate": "digests of the samples that are used",
     "profile.recordings": "digests of the samples that are used",
+    "fixed.file": "the digest of the file",
     "parameter_set": "the start values that follow from it, per point",
     "uncertainty.result": "the covariances that were read from it",
     "diagnose.package": "the digest of the package's classes",
@@ -51,7 +53,7 @@ def study_identity(scenario: Scenario | TuneScenario, kind: str | None = None) -
     """What is asked of ``scenario``, run as ``kind`` (its own unless another command runs it)."""
     wanted = kind or scenario.kind
     asked: Identity = {"kind": wanted, "seed": scenario.seed, "fmu": scenario.fmu.sha256}
-    asked |= flatten(scenario.table)
+    asked |= flatten(scenario.table) | _of_files(scenario)
     if isinstance(scenario, TuneScenario):
         asked |= {f"start values.{name}": value for name, value in scenario.fixed.items()}
         for profile in scenario.profiles:
@@ -65,6 +67,8 @@ def study_identity(scenario: Scenario | TuneScenario, kind: str | None = None) -
         spec = scenario.diagnose
         if spec.model is not None:
             asked["diagnose.package"] = digest_of_folder(spec.package, MODELICA)
+            if spec.model.endswith(".mo"):
+                asked["diagnose.model"] = digest_of_text(Path(spec.model).read_text(encoding="utf-8"))
         if spec.catalogue is not None:
             asked["diagnose.catalogue"] = digest_of_folder(spec.catalogue, ["*.py"])
     return asked | _versions()
@@ -123,6 +127,13 @@ def _members(
 
 def _join(*parts: str) -> str:
     return ".".join(part for part in parts if part)
+
+
+def _of_files(scenario: Scenario | TuneScenario) -> Identity:
+    """Files whose paths are start values."""
+    home = scenario.path.parent
+    files = {n: v.path(home) for n, v in scenario.table.fixed.items() if isinstance(v, FileTable)}
+    return {f"fixed.{name}.file": digest_of_file(file) for name, file in files.items()}
 
 
 def _of_recordings(scenario: Scenario) -> Identity:

@@ -1,12 +1,10 @@
 """A system as one instance: the integrator sees one vector of states, one of event indicators, one event iteration.
 
-Model Exchange components are integrated together, their connections exact at every call of the right-hand side;
-Co-Simulation components act at time events of the whole (see ``stepped``).
+Model Exchange components are integrated together (see ``integrated``), their connections exact at every call of the
+right-hand side; Co-Simulation components act at time events of the whole (see ``stepped``).
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -23,12 +21,13 @@ from thsa_cosim.fmu.point import Point
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.system.adaptive import Adaptive
 from thsa_cosim.system.description import DISTURBANCE, SystemDescription
+from thsa_cosim.system.integrated import Integrated
 from thsa_cosim.system.member import crowded, member, named, own_processes
+from thsa_cosim.system.point import SystemPoint
 from thsa_cosim.system.stepped import Stepped
 from thsa_cosim.system.wiring import Port, Wiring
 
 _EVENT_ITERATIONS = 100
-_VECTORS = {"GetContinuousStates", "GetNominalsOfContinuousStates", "GetEventIndicators"}
 
 
 class SystemInstance(Instance):
@@ -71,9 +70,8 @@ class SystemInstance(Instance):
             part = member(component, number, place, self._progress, apart=apart, sink=self._sink)
             part.messages = self.messages
             self.parts[name] = part
-        self._continuous = [c.name for c in self._system.components if c.execution == "continuous"]
-        self._slices = _slices([self.parts[n].description.states for n in self._continuous])
-        self._indicators = _slices([self.parts[n].description.event_indicators for n in self._continuous])
+        continuous = [c.name for c in self._system.components if c.execution == "continuous"]
+        self._integrated = Integrated({name: self.parts[name] for name in continuous})
         self._others = [c for c in self._system.components if c.execution != "continuous"]
         self._wiring = Wiring(self._system, self.parts, [c.name for c in self._others])
         # At one instant, what has to catch up with it goes first, then what samples there.
@@ -124,6 +122,17 @@ class SystemInstance(Instance):
                         self._given.setdefault(name, {})[own] = factor * float(values[column]) + offset
         self._give_starts()
         self.set_values(channels, values)
+
+    def set_texts(self, texts: Mapping[int, str]) -> None:
+        """Set String variables of components through the names of the system."""
+        given: dict[str, dict[int, str]] = {}
+        for reference, text in texts.items():
+            for (name, own), *_ in self._pins[self._name(reference)]:
+                variable = self.parts[name].description.variable(own)
+                given.setdefault(name, {})[variable.value_reference] = text
+        for name, part in self.parts.items():
+            with named(name):
+                part.set_texts(given.get(name, {}))
 
     def _give_starts(self) -> None:
         for component in self._system.components:
@@ -252,48 +261,37 @@ class SystemInstance(Instance):
     def set_time(self, time: float) -> None:
         """Set the independent variable of every integrated component [s]."""
         self.move_to(time)
-        for name in self._continuous:
-            self.parts[name].set_time(time)
+        self._integrated.set_time(time)
 
     def enter_event_mode(self) -> None:
         """Bring every integrated component into Event Mode."""
-        for name in self._continuous:
-            with named(name):
-                self.parts[name].enter_event_mode()
+        self._integrated.enter_event_mode()
 
     def enter_continuous_time_mode(self) -> None:
         """Bring every integrated component into Continuous-Time Mode."""
-        for name in self._continuous:
-            with named(name):
-                self.parts[name].enter_continuous_time_mode()
+        self._integrated.enter_continuous_time_mode()
 
     def event_iteration(self) -> EventInfo:
         """Let stepped components act, then iterate events and connections until nothing changes."""
         self._act()
-        if not self._continuous:
+        if not self._integrated:
             return EventInfo(False, False, False, False, min(s.next_time for s in self._stepped))
-        needs = terminate = nominals = states = False
-        following: float | None = None
+        terminate = nominals = states = False
         for _ in range(_EVENT_ITERATIONS):
             before = self._wiring.values.copy()
             self.propagate(events=True)
-            needs, following = False, None
-            for name in self._continuous:
-                with named(name):
-                    info = self.parts[name].event_iteration()
-                needs |= info.needs_update
-                terminate |= info.terminate
-                nominals |= info.nominals_changed
-                states |= info.states_changed
-                if info.next_event_time is not None:
-                    following = min(following or np.inf, info.next_event_time)
+            info = self._integrated.event_iteration()
+            terminate |= info.terminate
+            nominals |= info.nominals_changed
+            states |= info.states_changed
             self.propagate(events=True)
-            if terminate or (not needs and np.array_equal(before, self._wiring.values)):
+            if terminate or (not info.needs_update and np.array_equal(before, self._wiring.values)):
                 break
         else:
             raise SimulationFailure(
                 Status.FMI_ERROR, "the event iteration of the system does not come to an end"
             )
+        following = info.next_event_time
         for stepped in self._stepped:
             following = min(np.inf if following is None else following, stepped.next_time)
         return EventInfo(False, terminate, nominals, states, following)
@@ -321,48 +319,20 @@ class SystemInstance(Instance):
 
     def completed_integrator_step(self) -> tuple[bool, bool]:
         """Tell every integrated component; (enter event mode, terminate) if any asks for it."""
-        event = terminate = False
-        for name in self._continuous:
-            part = self.parts[name]
-            if part.description.capabilities.get("needsCompletedIntegratorStep", True):
-                with named(name):
-                    wants, ends = part.completed_integrator_step()
-                event |= wants
-                terminate |= ends
-        return event, terminate
+        return self._integrated.completed_integrator_step()
 
     def vector(self, name: str, values: FloatArray) -> None:
         """Read a vector of all integrated components, one after the other."""
-        assert name in _VECTORS
-        for part, where in zip(
-            self._continuous,
-            self._indicators if name == "GetEventIndicators" else self._slices,
-            strict=True,
-        ):
-            piece = np.zeros(where.stop - where.start)
-            if len(piece):
-                with named(part):
-                    self.parts[part].vector(name, piece)
-            values[where] = piece
+        self._integrated.vector(name, values)
 
     def place_states(self, time: float, states: FloatArray) -> None:
         """Set time and states of every integrated component."""
         self.move_to(time)
-        for name, where in zip(self._continuous, self._slices, strict=True):
-            part = self.parts[name]
-            part.set_time(time)
-            if where.stop > where.start:
-                part.vector("SetContinuousStates", np.ascontiguousarray(states[where]))
+        self._integrated.place(time, states)
 
     def derivatives(self, out: FloatArray) -> None:
         """Write dx/dt of every integrated component."""
-        for name, where in zip(self._continuous, self._slices, strict=True):
-            part = self.parts[name]
-            if where.stop > where.start:
-                piece = np.empty(where.stop - where.start)
-                verb = "GetDerivatives" if part.prefix == "fmi2" else "GetContinuousStateDerivatives"
-                part.vector(verb, piece)
-                out[where] = piece
+        self._integrated.derivatives(out)
 
     # -- Jacobian -------------------------------------------------------------------------------------
     @property
@@ -374,35 +344,7 @@ class SystemInstance(Instance):
 
     def jacobian(self, out: FloatArray) -> None:
         """df/dx = A + B G (I - D G)^-1 C, from the components' own derivatives and the connections."""
-        sources, targets = self._wiring.sources, self._wiring.targets
-        n, s, m = self.description.states, len(sources), len(targets)
-        a, b = np.zeros((n, n)), np.zeros((n, m))
-        c, d = np.zeros((s, n)), np.zeros((s, m))
-        for name, where in zip(self._continuous, self._slices, strict=True):
-            description = self.parts[name].description
-            pairs = np.array(description.state_references, dtype=np.uint32).reshape(-1, 2)
-            rows = [k for k, pin in enumerate(sources) if pin[0] == name]
-            outputs = [description.variable(sources[k][1]).value_reference for k in rows]
-            unknowns = np.array([*pairs[:, 1].tolist(), *outputs], dtype=np.uint32)
-            columns = [k for k, pin in enumerate(targets) if pin[0] == name and self._is_float(pin)]
-            inputs = [description.variable(targets[k][1]).value_reference for k in columns]
-            states = list(range(where.start, where.stop))
-            for knowns, places, of_states, of_outputs in (
-                (pairs[:, 0].tolist(), states, a, c),
-                (inputs, columns, b, d),
-            ):
-                for known, place in zip(knowns, places, strict=True):
-                    slope = np.empty(len(unknowns))
-                    one = np.array([known], dtype=np.uint32)
-                    self.parts[name].directional_derivative(unknowns, one, slope)
-                    of_states[where, place] = slope[: len(pairs)]
-                    of_outputs[rows, place] = slope[len(pairs) :]
-        gain = np.zeros((m, s))
-        gain[np.arange(m), self._wiring.feeds] = self._wiring.factor
-        out[:] = a + b @ gain @ np.linalg.solve(np.eye(s) - d @ gain, c) if s else a
-
-    def _is_float(self, pin: tuple[str, str]) -> bool:
-        return self.parts[pin[0]].description.variable(pin[1]).is_float
+        self._integrated.jacobian(self._wiring, out)
 
     # -- what a system does not have --------------------------------------------------------------------
     def do_step(self, time: float, step: float) -> None:
@@ -422,43 +364,3 @@ class SystemInstance(Instance):
     ) -> None:
         """Derivatives of a system come as its whole Jacobian."""
         raise NotImplementedError
-
-
-class SystemPoint:
-    """The point of a system; see ``thsa_cosim.fmu.point.Point``."""
-
-    def __init__(self, instance: SystemInstance, input_channels: Sequence[Channel]) -> None:
-        self._instance = instance
-        self._channels = _continuous_only(instance, input_channels)
-        self._dx = np.zeros(instance.description.states)
-
-    def place(self, time: float, states: FloatArray, inputs: FloatArray) -> None:
-        """Set time, states and inputs, then bring the connections up to date."""
-        self._instance.place_states(time, states)
-        self._instance.set_values(self._channels, inputs)
-        self._instance.propagate()
-
-    def derivatives(self, time: float) -> FloatArray:
-        """Return dx/dt."""
-        del time
-        self._instance.derivatives(self._dx)
-        return self._dx
-
-
-def _continuous_only(instance: SystemInstance, channels: Sequence[Channel]) -> list[Channel]:
-    variables = list(instance.description.variables.values())
-    found = []
-    for channel in channels:
-        keep = [
-            i
-            for i, reference in enumerate(channel.references.tolist())
-            if variables[reference].is_float and variables[reference].variability == "continuous"
-        ]
-        columns = tuple(channel.columns[i] for i in keep)
-        found.append(replace(channel, references=channel.references[keep], columns=columns))
-    return [channel for channel in found if len(channel.references)]
-
-
-def _slices(sizes: Sequence[int]) -> list[slice]:
-    ends = np.cumsum([0, *sizes]).tolist()
-    return [slice(a, b) for a, b in pairwise(ends)]

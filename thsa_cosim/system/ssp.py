@@ -19,7 +19,8 @@ from thsa_cosim.errors import FmuError, InputError, ParameterError
 from thsa_cosim.fmu.archive import check_archive, open_archive
 from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription, read_description
 from thsa_cosim.ssv import FLOATS, SSC, SSV, parse_parameter_set
-from thsa_cosim.system.flatten import Bus, Element, Link, Nested, flattened
+from thsa_cosim.system.flatten import flattened
+from thsa_cosim.system.nested import Bus, Element, Link, Nested
 from thsa_cosim.system.parameters import Binding, Mapped
 from thsa_cosim.system.structure import System
 from thsa_cosim.system.unit_definitions import UnitDefinitions, read_units

@@ -131,6 +131,7 @@ def _case(
             fixed=fixed,
             tolerance=scenario.simulation.tolerance,
             reduce=reduce,
+            texts=scenario.texts,
         ),
     )
 

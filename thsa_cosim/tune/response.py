@@ -57,6 +57,7 @@ class LoopTask:
     signal: str
     at: float
     reader: str
+    texts: Mapping[str, str]
 
     @property
     def recorded(self) -> tuple[str, ...]:
@@ -77,6 +78,7 @@ class LoopTask:
                 states=np.array([signals[name][k] for name in state_names(self.fmu)]),
                 signal=self.signal,
                 gains=self.gains,
+                texts=self.texts,
             )
         except SimulationFailure:
             return Margins(np.nan, np.nan, np.nan)
@@ -98,6 +100,7 @@ class MeasuredLoop:
     amplitude: float
     period: float
     tolerance: float | None
+    texts: Mapping[str, str]
 
     @property
     def recorded(self) -> tuple[str, ...]:
@@ -109,6 +112,7 @@ class MeasuredLoop:
         values = {**self.fixed, **{name: float(signals[name][-1]) for name in self.tuned}}
         try:
             with open_plant(self.fmu, _unpacked(self.fmu)) as plant:
+                plant.texts = self.texts
                 found = loop_response(
                     plant,
                     values,
@@ -243,6 +247,7 @@ def _loop_task(
             loop.amplitude,
             loop.period,
             scenario.simulation.tolerance,
+            scenario.texts,
         )
     return LoopTask(
         fmu,
@@ -254,4 +259,5 @@ def _loop_task(
         loop.signal,
         loop.at,
         loop.margins,
+        scenario.texts,
     )

@@ -1,14 +1,14 @@
 within THSA.Effects;
 block LoadDependentFriction "Friction in proportion to the load that the pair carries"
   extends THSA.Interfaces.FrictionEffect;
-  parameter Real mu(unit="1", min=-1, max=1) = 0 "Friction per load";
-  parameter Real mu_S(unit="1", min=-1, max=1) = 0 "Breakaway part of the friction per load";
+  parameter Real mu(unit="1", min=-20, max=20) = 0 "Friction per load";
+  parameter Real mu_S(unit="1", min=-20, max=20) = 0 "Breakaway part of the friction per load";
   parameter Real v_S(min=1e-9) = 1 "Stribeck speed";
   parameter Real n_S(unit="1", min=0.1, max=10) = 2 "Exponent of the decay of the breakaway part";
   parameter Real mu_v = 0 "Growth of the friction per load with the speed";
   parameter Real mu_2 = 0 "Growth of the friction per load with the load";
-  parameter Real mu_D(unit="1", min=-1, max=1) = 0 "Friction per load: half the difference of driving and driven";
-  parameter Real mu_A(unit="1", min=-1, max=1) = 0 "Friction per load: half the difference of positive and negative load";
+  parameter Real mu_D(unit="1", min=-20, max=20) = 0 "Friction per load: half the difference of driving and driven";
+  parameter Real mu_A(unit="1", min=-20, max=20) = 0 "Friction per load: half the difference of positive and negative load";
 equation
   F = ((mu + (if mu_S > 0 or mu_S < 0 then mu_S*exp(-((v^2 + 1e-12*v_S^2)/v_S^2)^(n_S/2)) else 0) + mu_v*v*s + mu_2*noEvent(abs(N)))
     *noEvent(abs(N)) + mu_A*N)*s + mu_D*N*s*s;

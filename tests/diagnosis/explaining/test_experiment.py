@@ -15,7 +15,7 @@ from thsa_cosim.diagnosis.explaining import experiment as room
 from thsa_cosim.diagnosis.explaining.profiles import Range, input_range, profiles, travel
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
-from thsa_cosim.scenario.schema import LimitsTable
+from thsa_cosim.scenario.diagnose_schema import LimitsTable
 from thsa_cosim.signals import Signals
 from thsa_cosim.study import Case
 

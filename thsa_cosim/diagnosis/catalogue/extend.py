@@ -5,13 +5,16 @@ that one and several effects have the same form, and the superset that the searc
 004).
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.catalogue.slots import INPUTS, OUTPUTS, Slot
+from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export import export_fmu
 from thsa_cosim.export.compile import native_platform
+from thsa_cosim.export.flatten import locate
 
 #: Extended models are named after their own class; the system model of the shipped package goes by the package's name.
 KNOWN_AS = {"THSA.Actuator": "THSA"}
@@ -23,10 +26,12 @@ def extended_class(
     candidates: Sequence[Candidate],
     values: Mapping[str, float] | None = None,
     description: str = "",
+    beside: str = "",
 ) -> str:
     """Modelica source of a class ``name`` that extends ``base`` (qualified) with the candidates' effects.
 
-    ``values``: start values by FMU variable, in SI units as the classes have them; else neutral.
+    ``values``: start values by FMU variable, in SI units as the classes have them; else neutral. ``beside``: source of
+    classes that are in no package (`source_beside`).
     """
     slots = {candidate.slot.name: candidate.slot for candidate in candidates}
     members = {
@@ -35,7 +40,7 @@ def extended_class(
     blocks = [_block(slot, members[name], values or {}) for name, slot in slots.items()]
     redeclared = ",\n    ".join(f"redeclare {_block_name(slot)} {slot.component}" for slot in slots.values())
     return (
-        f'within ;\nmodel {name} "{description or base}"\n'
+        f'within ;\n{beside}model {name} "{description or base}"\n'
         + "".join(blocks)
         + f"  extends {base}(\n    {redeclared});\nend {name};\n"
     )
@@ -82,12 +87,35 @@ def write_extended_model(
     own = KNOWN_AS.get(base, base.split(".")[-1])
     name = "_and_".join([f"{own}_with_{effects[0]}", *effects[1:]]).replace("-", "_")
     titles = ", ".join(dict.fromkeys(c.effect.title for c in candidates))
-    source = extended_class(name, base, candidates, values, f"{base} with: {titles}")
+    source = extended_class(
+        name, base, candidates, values, f"{base} with: {titles}", source_beside(model, package)
+    )
     file = write_extended(folder, name, source)
     fmu = folder / f"{name}.fmu"
     return file, export_fmu(str(file), package=package, output=fmu, platforms=(native_platform().fmi3,))
 
 
 def qualified(model: str, package: Path) -> str:
-    """``Actuator`` → ``THSA.Actuator``."""
+    """``Actuator`` → ``THSA.Actuator``; of a ``.mo`` file the class that it holds."""
+    if model.endswith(".mo"):
+        return locate(model, package)[1]
     return model if model.split(".")[0] == package.name else f"{package.name}.{model}"
+
+
+def source_beside(model: str, package: Path) -> str:
+    """The classes of a ``.mo`` file, to stand above the class that extends one of them; "" for a class of a package.
+
+    ModelicaError for a file that is part of a package.
+    """
+    if not model.endswith(".mo"):
+        return ""
+    name = qualified(model, package)
+    if "." in name:
+        raise ModelicaError(
+            f"{model}: holds the class {name} of a package; set diagnose.package to the package's folder and"
+            f' diagnose.model to "{name}".'
+        )
+    return (
+        re.sub(r"^\s*within\s*;", "", Path(model).read_text(encoding="utf-8"), count=1, flags=re.M).strip()
+        + "\n"
+    )

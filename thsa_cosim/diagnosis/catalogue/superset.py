@@ -12,7 +12,7 @@ import numpy as np
 from thsa_cosim.batch import Experiment, Job, Status
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate, candidates_of
 from thsa_cosim.diagnosis.catalogue.effect import Effect
-from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, write_extended
+from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, source_beside, write_extended
 from thsa_cosim.diagnosis.catalogue.slots import SCALES, Slot, find_slots
 from thsa_cosim.errors import StudyError
 from thsa_cosim.export import export_fmu
@@ -61,8 +61,10 @@ def build_superset(
     """Export the superset into ``folder``, where it is kept until anything that it is made from changes."""
     slots, effects = find_slots(model, package), tuple(effects)
     candidates = candidates_of(effects, slots, {})
-    name = qualified(model, package).replace(".", "_") + "_superset"
-    source = extended_class(name, qualified(model, package), candidates, description="All effects, neutral")
+    base = qualified(model, package)
+    name = base.replace(".", "_") + "_superset"
+    beside = source_beside(model, package)
+    source = extended_class(name, base, candidates, description="All effects, neutral", beside=beside)
     fmu = folder / f"{name}.fmu"
     platforms = (native_platform().fmi3,)
     made_from = export_digest(source, package, platforms)

@@ -7,7 +7,7 @@ residuals that the candidate's best combination promises (the score test, Rao 19
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -41,6 +41,8 @@ class Proposal:
     precision: FloatArray
     held: frozenset[str] = frozenset()
     """Names of shapes that are known: orders of the machine."""
+    moves: Mapping[str, FloatArray] = field(default_factory=dict)
+    """By unknown of the model, in its unit: (k,) what imitates one unit of each coefficient best."""
 
     @property
     def stderr(self) -> FloatArray:
@@ -189,6 +191,7 @@ class Orthogonal:
 def _propose(
     base: Fit, orthogonal: Orthogonal, candidate: Candidate, shapes: Mapping[str, float], response: FloatArray
 ) -> Proposal:
+    moved = orthogonal.project(response)
     left = orthogonal.remaining(response)
     whole = np.asarray(response.T @ response, dtype=float)
     precision = np.asarray(left.T @ left, dtype=float)
@@ -209,4 +212,5 @@ def _propose(
         amplitudes=amplitudes,
         remaining=float(np.trace(precision / np.outer(scale, scale)) / len(scale)),
         precision=precision,
+        moves=dict(zip(base.unknowns.names, moved * base.unknowns.scale[:, None], strict=True)),
     )

@@ -13,13 +13,14 @@ from pathlib import Path
 from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Variant
-from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, write_extended
+from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, source_beside, write_extended
 from thsa_cosim.diagnosis.catalogue.slots import find_slots
 from thsa_cosim.diagnosis.catalogue.superset import scales_of
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import values_of
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified
 from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
@@ -88,7 +89,8 @@ class LawSearch:
         )
         name = f"{base.replace('.', '_')}_empirical"
         terms = candidates_of((EMPIRICAL,), slots, {})
-        source = extended_class(name, base, [*own, *terms], shapes)
+        beside = source_beside(self.spec.model, self.spec.package)
+        source = extended_class(name, base, [*own, *terms], shapes, beside=beside)
         file = write_extended(self.folder, name, source)
         fmu = export_fmu(
             str(file),
@@ -115,11 +117,13 @@ class LawSearch:
         return Unknowns(tuple(u if u.declared else replace(u, start=values[u.name]) for u in members))
 
 
-def law_of(found: Attribution, *, added: bool) -> EmpiricalLaw:
-    """A search's accepted terms in the words of the result."""
-    values = values_of(found.final, declared=False)
+def law_of(found: Attribution, fit: Fit, *, added: bool) -> EmpiricalLaw:
+    """A search's accepted terms in the words of the result, with the values of ``fit``."""
+    values = values_of(fit, declared=False)
     terms = tuple(
-        EmpiricalTerm(scored.candidate.slot.name, LIBRARY[p.name][0], values[p.variable])
+        EmpiricalTerm(
+            scored.candidate.slot.name, LIBRARY[p.name][0], replace(values[p.variable], variable=p.variable)
+        )
         for scored in found.accepted
         for p in scored.candidate.coefficients
     )

@@ -14,6 +14,7 @@
 #include <math.h>
 #include <string.h>
 #include "discrete.h"
+#include "explain.h"
 #include "solver.h"
 
 #if N_X > 0
@@ -32,6 +33,10 @@ typedef struct {
 static Status give_up(Instance *c, const char *why) {
     instance_log(c, DISCARD, LOG_DISCARD, "%s at time %.15g", why, c->s.now.time);
     return DISCARD;
+}
+
+static Status not_linearized(Instance *c) {
+    return explain_failure(c, DISCARD, "derivatives or Jacobian cannot be computed", STATES, NULL, 0);
 }
 
 static double time_grain(const Instance *c, double end) {
@@ -152,6 +157,13 @@ static double find_event(Instance *c, double h, const Check *start, Check *end, 
     return dip.worst > 0.0 ? locate(c, h, 0.0, start, theta, &dip, grain) : 0.0;
 }
 
+/* For messages: the relation that disagrees most at the end of a step has an event. */
+static void note_event(Instance *c, const Check *end) {
+    int most = 0;
+    for (int k = 1; k < N_G; k++) most = end->disagreement[k] > end->disagreement[most] ? k : most;
+    c->sought[most]++;
+}
+
 /* A first step over which an Euler step would move 100 tolerances: the controller finds its way from there. */
 static double first_step(const Instance *c, double most) {
     double rate = 0.0;
@@ -206,6 +218,7 @@ Status solver_advance(Instance *c, double end) {
     Check start = {{0.0}, -DBL_MAX}, finish = start;
     memcpy(u_from, now->u, sizeof u_from);
     now->bends = 0;
+    memset(c->sought, 0, sizeof c->sought);
     if (N_G && (instance_indicators(c) != OK || judge(c, c->g, &start)))
         return give_up(c, "event indicators cannot be computed");
 
@@ -214,7 +227,7 @@ Status solver_advance(Instance *c, double end) {
         int landing = 0, was_rejected = 0, last;
         double h, error, accepted = restarted ? CAREFUL : 1.0;
         if (N_ENDS && discrete_domain(c, now->time, now->x, now->u) != OK) return DISCARD;
-        if (solver_linearize(c)) return give_up(c, "derivatives or Jacobian cannot be computed");
+        if (solver_linearize(c)) return not_linearized(c);
         if (!(now->step > 0.0)) now->step = first_step(c, remaining);
         h = 1.25 * now->step >= remaining ? remaining : now->step > 0.5 * remaining ? 0.5 * remaining : now->step;
         if (rapid > MOST_RAPID) {
@@ -222,12 +235,12 @@ Status solver_advance(Instance *c, double end) {
             h = fmin(h, fmax(blind, grain));
         }
         for (;;) { /* attempts at one step */
-            if (++attempts > MOST_STEPS) return give_up(c, "too many internal steps in one communication step");
+            if (++attempts > MOST_STEPS) return explain_slowness(c, "too many internal steps in one communication step");
             if (c->before_step && !landing) {
                 c->before_step(c, now->time + h);
                 from = now->time;
                 memcpy(u_from, now->u, sizeof u_from);
-                if (solver_linearize(c)) return give_up(c, "derivatives or Jacobian cannot be computed");
+                if (solver_linearize(c)) return not_linearized(c);
             }
             error = solver_step(c, h);
             if (error >= 0.0 && error <= accepted) {
@@ -242,6 +255,7 @@ Status solver_advance(Instance *c, double end) {
                 }
                 if (theta > 0.0) { /* redo to land there, until the shorter step agrees about where it is */
                     const double short_of_end = (1.0 - theta) * h;
+                    if (!landing) note_event(c, &finish);
                     landing++;
                     if (theta >= 1.0 || landing > MOST_REDONE) break;
                     if (landing > 1 && (short_of_end < 1e-3 * h || short_of_end <= 4.0 * grain)) break;
@@ -260,7 +274,8 @@ Status solver_advance(Instance *c, double end) {
             accepted = CAREFUL;
             now->step = h;
             if (h < grain)
-                return give_up(c, error < 0.0 ? "the model cannot be evaluated" : "the step size became too small");
+                return error < 0.0 ? explain_failure(c, DISCARD, "the model cannot be evaluated", STATES, c->x_new, N_X)
+                                   : explain_slowness(c, "the step size became too small");
         }
         c->steps++;
         restarted = 0;

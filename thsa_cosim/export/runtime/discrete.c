@@ -9,6 +9,7 @@
 #include <math.h>
 #include <string.h>
 #include "discrete.h"
+#include "explain.h"
 
 #define POINT s->now.time, s->now.x, s->now.u, s->p, s->d, s->now.m
 
@@ -28,15 +29,20 @@ static Status give_up(Instance *c, const char *why) {
     return DISCARD;
 }
 
+static Status not_computed(Instance *c) {
+    return explain_failure(c, DISCARD, "discrete variables cannot be computed", DISCRETES, NULL, 0);
+}
+
 /* The update of z from the present z; counts what changed beyond the left limits. */
 static Status refresh(Instance *c, int *changed) {
     const State *s = &c->s;
     double fresh[N_Z + 1], *z = z_of(c);
     int count = 0;
     if (!N_Z) return OK;
-    if (model_discrete(POINT, fresh)) return give_up(c, "discrete variables cannot be computed");
+    if (model_discrete(POINT, fresh)) return not_computed(c);
     for (int k = N_L; k < N_Z; k++) {
-        if (!is_finite(fresh[k])) return give_up(c, "a discrete variable is not finite");
+        if (!is_finite(fresh[k]))
+            return explain_failure(c, DISCARD, "discrete variables cannot be computed", DISCRETES, fresh, N_Z);
         count += z[k] != fresh[k];
         z[k] = fresh[k];
     }
@@ -49,7 +55,7 @@ static Status take_left_limits(Instance *c) {
     const State *s = &c->s;
     double fresh[N_Z + 1];
     if (!N_L) return OK;
-    if (model_discrete(POINT, fresh)) return give_up(c, "discrete variables cannot be computed");
+    if (model_discrete(POINT, fresh)) return not_computed(c);
     for (int k = 0; k < N_L; k++) z_of(c)[k] = before_of(c)[k] = fresh[k];
     return OK;
 }
@@ -58,12 +64,13 @@ static Status take_left_limits(Instance *c) {
 static Status agree(Instance *c) {
     for (int i = 0; i < MOST_ITERATIONS; i++) {
         int changed = 0;
+        explain_watch(c, i, MOST_ITERATIONS);
         if (instance_indicators(c) != OK) return DISCARD;
         changed += instance_switch_modes(c, 1);
         if (refresh(c, &changed) != OK) return DISCARD;
         if (!changed) return OK;
     }
-    return give_up(c, "the event iteration does not settle");
+    return explain_unsettled(c, DISCARD, "the event iteration does not settle");
 }
 
 static int reinitialize(Instance *c) {
@@ -87,6 +94,7 @@ static int reinitialize(Instance *c) {
 static Status iterate(Instance *c, int *jumped) {
     for (int i = 0; i < MOST_ITERATIONS; i++) {
         int changed = 0;
+        explain_watch(c, i, MOST_ITERATIONS);
         if (agree(c) != OK) return DISCARD;
         const int moved = reinitialize(c);
         if (moved < 0) return give_up(c, "a state cannot be reinitialized");
@@ -102,7 +110,7 @@ static Status iterate(Instance *c, int *jumped) {
         if (changed || moved) instance_changed(c);
         if (!changed && !moved) return OK;
     }
-    return give_up(c, "the event iteration does not settle");
+    return explain_unsettled(c, DISCARD, "the event iteration does not settle");
 }
 
 /* Sets the ticks of the samples that are due and moves their next time on. */

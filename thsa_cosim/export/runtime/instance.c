@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "discrete.h"
+#include "explain.h"
 #include "solver.h"
 
 enum { MOST_ITERATIONS = 50 };
@@ -136,6 +137,7 @@ double instance_dead_band(const Instance *c, int k) {
  * that is not enough to get on, the run ends. The Co-Simulation crosses such bursts itself (advance.c). */
 static void widen(Instance *c, int k) {
     enum { PATIENCE = 12, MOST_CAUGHT = 5000 };
+    char text[200];
     Motion *now = &c->s.now;
     const double band = instance_dead_band(c, k);
     if (c->kind != MODEL_EXCHANGE) return;
@@ -154,7 +156,8 @@ static void widen(Instance *c, int k) {
         return;
     }
     if (now->band[k] == 0.0)
-        instance_warn(c, "relation %d changes without end from time %.15g on: it gets a dead band", k, now->time);
+        instance_warn(c, "%s changes without end from time %.15g on: it gets a dead band",
+                      explain_relation(k, text, sizeof text), now->time);
     now->band[k] = fmin(4.0 * band, 1e-3 * now->span[k]);
     now->returns[k] = PATIENCE / 2;
 }
@@ -179,6 +182,7 @@ static Status update_dependent(Instance *c) {
 int instance_switch_modes(Instance *c, int report) {
     Motion *now = &c->s.now;
     const double grain = discrete_grain(now->time);
+    char text[200];
     int changed = 0;
     discrete_slopes(c);
     for (int k = 0; k < N_G; k++) {
@@ -191,8 +195,8 @@ int instance_switch_modes(Instance *c, int report) {
         widen(c, k);
         changed++;
         if (report && c->categories & LOG_EVENTS)
-            instance_log(c, OK, LOG_EVENTS, "event at time %.17g: relation %d becomes %s", now->time, k,
-                         wanted > 0.5 ? "true" : "false");
+            instance_log(c, OK, LOG_EVENTS, "event at time %.17g: %s becomes %s", now->time,
+                         explain_relation(k, text, sizeof text), wanted > 0.5 ? "true" : "false");
     }
     if (changed) instance_changed(c);
     return changed;
@@ -200,11 +204,12 @@ int instance_switch_modes(Instance *c, int report) {
 
 static Status settle_relations(Instance *c) {
     for (int i = 0; N_G && i < MOST_ITERATIONS; i++) {
+        explain_watch(c, i, MOST_ITERATIONS);
         if (instance_indicators(c) != OK) return DISCARD;
         if (!instance_switch_modes(c, 1)) return OK;
         c->events++;
     }
-    return N_G ? fail(c, DISCARD, "the event iteration does not settle") : OK;
+    return N_G ? explain_unsettled(c, DISCARD, "the event iteration does not settle") : OK;
 }
 
 Status instance_update_modes(Instance *c) {
@@ -213,14 +218,18 @@ Status instance_update_modes(Instance *c) {
     c->events += N_EVENTS;
     const Status status = N_EVENTS ? discrete_update(c) : settle_relations(c);
     if (status != OK || !c->s.now.endless) return status;
+    char text[200], why[300];
+    snprintf(why, sizeof why, "%s changes without end, faster than the run gets on,",
+             explain_relation(c->s.now.endless - 1, text, sizeof text));
     c->s.now.endless = 0;
-    return fail(c, DISCARD, "a relation changes without end, faster than the run gets on,");
+    return fail(c, DISCARD, why);
 }
 
 static Status not_initialized(Instance *c, const char *why) {
+    if (why) explain_failure(c, FAILED, why, STATES, c->s.now.x, N_X);
     memcpy(c->s.now.x, c->s.x_start, sizeof c->s.now.x);
     instance_changed(c);
-    return fail(c, FAILED, why);
+    return FAILED;
 }
 
 Status instance_initialize(Instance *c) {
@@ -242,6 +251,7 @@ Status instance_initialize(Instance *c) {
         for (int k = 0; k < N_G; k++) s->now.m[k] = c->g[k] > 0.0;
 #endif
     for (int i = 0; i < MOST_ITERATIONS; i++) {
+        explain_watch(c, i, MOST_ITERATIONS);
         instance_changed(c);
         if (model_initial(s->now.time, s->now.u, s->p, s->d, s->now.m, s->x_start, s->now.x) ||
             !all_finite(s->now.x, N_X))
@@ -263,7 +273,8 @@ Status instance_initialize(Instance *c) {
 #endif
         }
     }
-    return not_initialized(c, "the initial equations and relations do not settle");
+    explain_unsettled(c, FAILED, "the initial equations and relations do not settle");
+    return not_initialized(c, NULL);
 }
 
 Status instance_settle(Instance *c) {
@@ -279,7 +290,7 @@ Status instance_derivatives(Instance *c) {
     const State *s = &c->s;
     if (c->dx_valid) return OK;
     if (N_X && (model_rhs(POINT, c->dx) || !all_finite(c->dx, N_X)))
-        return fail(c, DISCARD, "derivatives cannot be computed");
+        return explain_failure(c, DISCARD, "derivatives cannot be computed", DERIVATIVES, c->dx, N_X);
     c->dx_valid = 1;
     return OK;
 }
@@ -288,7 +299,7 @@ Status instance_indicators(Instance *c) {
     const State *s = &c->s;
     if (c->g_valid) return OK;
     if (N_G && (model_indicators(POINT, c->g) || !all_finite(c->g, N_G)))
-        return fail(c, DISCARD, "event indicators cannot be computed");
+        return explain_failure(c, DISCARD, "event indicators cannot be computed", RELATIONS, c->g, N_G);
     c->g_valid = 1;
     return OK;
 }
@@ -321,7 +332,7 @@ Status instance_copy(Instance *c, Copy what, double *out, size_t n) {
 static Status evaluate_outputs(Instance *c) {
     const State *s = &c->s;
     if (c->w_valid || c->y_valid) return OK;
-    if (N_Y && model_outputs(POINT, c->w)) return fail(c, DISCARD, "outputs cannot be computed");
+    if (N_Y && model_outputs(POINT, c->w)) return explain_failure(c, DISCARD, "outputs cannot be computed", STATES, NULL, 0);
     c->y_valid = 1;
     return OK;
 }
@@ -329,7 +340,7 @@ static Status evaluate_outputs(Instance *c) {
 static Status evaluate_algebraic(Instance *c) {
     const State *s = &c->s;
     if (c->w_valid) return OK;
-    if (N_W && model_algebraic(POINT, c->w)) return fail(c, DISCARD, "variables cannot be computed");
+    if (N_W && model_algebraic(POINT, c->w)) return explain_failure(c, DISCARD, "variables cannot be computed", STATES, NULL, 0);
     c->w_valid = c->y_valid = 1;
     return OK;
 }

@@ -91,6 +91,11 @@ struct Instance {
     double x_new[N_X + 1];
     long events, steps, rejected;
     unsigned char asserted[N_A + 1]; /* violations are reported once */
+
+    /* for messages only (explain.c) */
+    double watched[N_M + 1];         /* m before the last turn of an iteration */
+    unsigned char restless[N_M + 1]; /* which of m changed in its last turns */
+    long sought[N_G + 1];            /* events of each relation that were sought since the communication step began */
 };
 
 extern const char *const category_names[6]; /* in the order of the bits of Category */

@@ -24,7 +24,13 @@
 #define N_A 0 /* assertions */
 #define N_ENDS 0 /* those of them, the last ones, that end a run */
 #define N_GUESS 0 /* 1: the initial values depend on relations */
-#define N_IMPLICIT 0 /* unknowns of implicit equations, kept at the end of the cache */
+#define N_IMPLICIT 0 /* unknowns of implicit equations, kept in the cache */
+#endif
+#ifndef N_TEXTS
+#define N_TEXTS 0 /* entries of model_text: one each for states, relations, discrete variables and loops */
+#define N_LOOPS 0 /* loops of the running model, then of its initialization, then all of the running model at once; the
+                   * last double of the cache is the number (from 1) of the one that has no solution, else 0 */
+#define N_PIVOTS 0 /* expressions that the model divides by; their texts follow on those of the loops */
 #endif
 #ifndef N_TIMED
 #define N_TIMED 0 /* relations of time alone, linear in it: time events */
@@ -60,5 +66,7 @@ int model_time_slopes(MODEL_POINT, double *s);        /* dg/dt of relations that
 int model_samples(const double *p, const double *d, const double *m, double *s); /* start and interval of each sample */
 int model_assertions(MODEL_POINT, double *a);       /* nonzero where violated */
 extern const char *const model_assertion_text[];
+int model_pivots(MODEL_POINT, double *a);           /* 0 where something cannot be solved */
+extern const char *const model_text[];
 
 #endif

@@ -40,6 +40,9 @@ def write_extended_scenario(result: DiagnosisResult, folder: Path) -> Path | Non
     asked["recordings"] = recordings
     if "parameter_set" in asked:
         asked["parameter_set"] = _seen_from(folder, home / asked["parameter_set"])
+    files = {n: v for n, v in asked.get("fixed", {}).items() if isinstance(v, Mapping)}
+    moved = {n: {"file": _seen_from(folder, home / v["file"])} for n, v in files.items()}
+    asked["fixed"] = {**asked.get("fixed", {}), **moved}
     asked["parameters"] = [
         *(_declared(p, result.declared_after.get(p["name"])) for p in asked["parameters"]),
         *_coefficients(result, result.extended_fmu),

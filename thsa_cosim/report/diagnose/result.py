@@ -7,10 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from thsa_cosim.diagnosis.results import (
+    Balance,
     DiagnosisResult,
     EmpiricalLaw,
     Errors,
     Evidence,
+    FoundEffect,
+    Judged,
     SeparatingExperiment,
     StructuredError,
     Value,
@@ -30,17 +33,7 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
         "title": result.title,
         "status": result.status,
         "verdict": result.verdict,
-        "effects": [
-            {
-                "name": e.name,
-                "title": e.title,
-                "parameters": _values(e.parameters),
-                "equivalent": list(e.equivalent),
-                "probability": e.probability,
-                "order": e.order,
-            }
-            for e in result.effects
-        ],
+        "effects": [_effect(e) for e in result.effects],
         "known": [{"name": e.name, "parameters": _values(e.parameters)} for e in result.known],
         "before": {**_errors(result.before), "recordings": _errors(result.recordings_before)},
         "after": {**_errors(result.after), "recordings": _errors(result.recordings_after)},
@@ -56,34 +49,11 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
         if result.force_before is None
         else _force(result.force_before, result.force_after),
         "threshold": result.threshold,
-        "candidates": [
-            {
-                "name": j.name,
-                "variant": j.variant,
-                "round": j.round,
-                "fit_gain": j.fit_gain,
-                "held_out_gain": j.held_out_gain,
-                "p_value": j.p_value,
-                "parameters": _values(j.parameters),
-                "decision": j.decision,
-                "reason": j.reason,
-            }
-            for j in result.judged
-        ],
+        "candidates": [_candidate(j) for j in result.judged],
         "not_testable": [
             {"name": j.variant, "reason": j.reason} for j in result.judged if j.decision == "not testable"
         ],
-        "balance": [
-            {
-                "equation": b.equation,
-                "unit": b.unit,
-                "rmse": b.rmse,
-                "noise": b.noise,
-                "share": b.share,
-                "at_fault": b.at_fault,
-            }
-            for b in result.balances
-        ],
+        "balance": [_balance(b) for b in result.balances],
         "evidence": None if result.evidence is None else _evidence(result.evidence),
         "empirical": None if result.empirical is None else _law(result.empirical),
         "equivalence": [{"names": list(c.names), "angle_deg": c.angle_deg} for c in result.equivalence],
@@ -131,6 +101,42 @@ def write_diagnosis(result: DiagnosisResult, folder: Path) -> list[Path]:
         files.append(again)
     write_json(folder / RESULT, content)
     return [*files, folder / RESULT, *write_pictures(folder)]
+
+
+def _effect(effect: FoundEffect) -> dict[str, Any]:
+    return {
+        "name": effect.name,
+        "title": effect.title,
+        "parameters": _values(effect.parameters),
+        "equivalent": list(effect.equivalent),
+        "probability": effect.probability,
+        "order": effect.order,
+    }
+
+
+def _candidate(judged: Judged) -> dict[str, Any]:
+    return {
+        "name": judged.name,
+        "variant": judged.variant,
+        "round": judged.round,
+        "fit_gain": judged.fit_gain,
+        "held_out_gain": judged.held_out_gain,
+        "p_value": judged.p_value,
+        "parameters": _values(judged.parameters),
+        "decision": judged.decision,
+        "reason": judged.reason,
+    }
+
+
+def _balance(balance: Balance) -> dict[str, Any]:
+    return {
+        "equation": balance.equation,
+        "unit": balance.unit,
+        "rmse": balance.rmse,
+        "noise": balance.noise,
+        "share": balance.share,
+        "at_fault": balance.at_fault,
+    }
 
 
 def _experiment(best: SeparatingExperiment) -> dict[str, Any]:

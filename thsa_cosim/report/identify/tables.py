@@ -7,9 +7,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from thsa_cosim.identify.off_published import KIND as OFF_PUBLISHED
 from thsa_cosim.identify.results import ForceBalance, IdentifyResult, LawResult, PointResult
+from thsa_cosim.inspection import Inspection
 from thsa_cosim.report.identify.doubts import LawDoubts, doubt_sentences
-from thsa_cosim.report.inspection import print_trust
+from thsa_cosim.report.inspection import print_inspection, print_trust
 from thsa_cosim.report.parts.text import number, percent
 from thsa_cosim.report.simulate.tables import error_cells
 
@@ -28,6 +30,8 @@ def print_identify(console: Console, result: IdentifyResult) -> None:
     if result.force is not None:
         console.print(Text(force_sentence(result.force)), highlight=False)
     print_trust(console, result.trust)
+    # Found by the fit, and no reason against it: nothing has printed them yet.
+    print_inspection(console, Inspection.of(f for f in result.data.findings if f.kind == OFF_PUBLISHED))
     for note in result.notes:
         console.print(Text(f"note: {note}"), highlight=False)
 

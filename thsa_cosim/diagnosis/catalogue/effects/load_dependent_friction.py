@@ -20,7 +20,8 @@ def _variant(*parameters: EffectParameter, beside: bool) -> Variant:
 
 
 def _share(name: str, description: str, lower: float) -> EffectParameter:
-    return EffectParameter(name, "1", 0.01, description, lower=lower, upper=0.9)
+    # Of a thread's axial force the share is tan(friction angle)/tan(lead angle): above one where it locks itself.
+    return EffectParameter(name, "1", 0.01, description, lower=lower, upper=20.0)
 
 
 MU = _share("mu", "friction per load", 0.0)
@@ -57,7 +58,7 @@ EFFECT = Effect(
             beside=True,
         ),
         _variant(GROWTH, beside=True),
-        _variant(_share("mu_D", "half the difference of driving and driven", -0.9), beside=True),
-        _variant(_share("mu_A", "half the difference of positive and negative load", -0.9), beside=True),
+        _variant(_share("mu_D", "half the difference of driving and driven", -20.0), beside=True),
+        _variant(_share("mu_A", "half the difference of positive and negative load", -20.0), beside=True),
     ),
 )

@@ -1,0 +1,87 @@
+"""What an untestable part of an effect leaves open of the parameters that imitate it, against least squares."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thsa_cosim.diagnosis.catalogue.candidate import Candidate, CandidateParameter
+from thsa_cosim.diagnosis.choosing.hidden import hidden_parts, notes_on_hidden, widening
+from thsa_cosim.diagnosis.choosing.screen import propose
+from thsa_cosim.diagnosis.fitting.fit import Fit
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
+
+N, SPREAD, K_T = 4000, 0.015, 0.3
+RNG = np.random.default_rng(3)
+#: What a torque constant, per 0.01 of it, and a friction do to a current; a part of the friction that scales the load
+#: does what the torque constant does, but for one in a thousand.
+TORQUE, FRICTION, OTHER = RNG.standard_normal((3, N))
+PARTS = {"scales": -TORQUE / 0.01 * K_T + 1e-3 * OTHER, "differs": OTHER / 0.01}
+
+
+def candidate(name: str) -> Candidate:
+    own = CandidateParameter(
+        name, f"screwEffect.loss.{name}", "1", "coefficient", 0.01, -20.0, 20.0, 0.0, (0.01,), False, False
+    )
+    described: Any = SimpleNamespace(description=f"what {name}")
+    variant: Any = SimpleNamespace(
+        block="Loss", beside=True, instead=False, component="loss", parameters=(described,)
+    )
+    slot: Any = SimpleNamespace(name="screw", interface="FrictionEffect")
+    effect: Any = SimpleNamespace(name="loss")
+    return Candidate(effect, variant, slot, 0, (own,), (own,), True)
+
+
+def fitted(spread: float) -> Fit:
+    unknowns = Unknowns(
+        (
+            Unknown("K_t", "K_t", "N.m/A", K_T, spread, 0.01, 0.01, 9.0),
+            Unknown("T_c", "T_c", "N.m", 0.1, np.inf, 1.0, 0.0, 9.0),
+        )
+    )
+    jacobian = np.column_stack([TORQUE, FRICTION])
+    return Fit(unknowns, np.array([0.307, 0.1]), RNG.standard_normal(N), jacobian, np.ones(2), 0.0, True)
+
+
+def found(fit: Fit, name: str) -> Any:
+    def residual(values: Any) -> np.ndarray:
+        return fit.residual + values[f"screwEffect.loss.{name}"] * PARTS[name]
+
+    bench: Any = SimpleNamespace(
+        residuals=lambda unknowns, vectors, _: [residual(unknowns.named(v)) for v in vectors]
+    )
+    part = candidate(name)
+    one = SimpleNamespace(proposals=propose(bench, fit, [(part, {})]), threshold=17.0)
+    return SimpleNamespace(rounds=(one,), accepted=(SimpleNamespace(candidate=part),), final=fit, base=fit)
+
+
+@pytest.mark.parametrize("spread", [SPREAD, 0.1])
+def test_with_the_part_open_the_errors_are_those_of_the_fit_with_it(spread: float) -> None:
+    """Covariance of all three unknowns together, by the inverse of their information."""
+    fit = fitted(spread)
+    parts = hidden_parts(found(fit, "scales"))
+    whole = np.column_stack([fit.jacobian, PARTS["scales"]])
+    prior = np.diag([(0.01 / spread) ** 2, 0.0, 0.0])
+    known = whole.T @ whole / fit.inflation + prior
+    expected = np.sqrt(np.diag(np.linalg.inv(known))) * [0.01, 1.0, 1.0]
+    own = np.sqrt(np.diag(np.linalg.inv(known[:2, :2]))) * [0.01, 1.0]
+    assert parts[0].stderr == pytest.approx(expected[2], rel=0.02)
+    np.testing.assert_allclose(np.hypot(own, widening(parts, fit)), expected[:2], rtol=0.02)
+
+
+def test_a_note_says_what_the_parameter_would_be_and_that_it_is_to_be_measured_apart() -> None:
+    fit = fitted(SPREAD)
+    (part,) = hidden_parts(found(fit, "scales"))
+    assert part.moves["K_t"] == pytest.approx(K_T * part.stderr, rel=0.01)
+    (note,) = notes_on_hidden([part], fit, np.array([7e-4, 1e-2]))
+    assert note.startswith(
+        "loss:screw: scales, what scales, acts on these recordings as a change of K_t does"
+    )
+    assert f"K_t would be {0.307 + part.moves['K_t']:.4g} in place of 0.307 N.m/A" in note
+
+
+def test_a_part_that_would_be_seen_leaves_nothing_open() -> None:
+    fit = fitted(SPREAD)
+    assert hidden_parts(found(fit, "differs")) == ()
+    assert not widening((), fit).any()

@@ -176,7 +176,8 @@ def model_runs(
     values = {u.variable: result.declared_after[u.name].value + u.offset for u in members}
     values |= {v.variable: v.value for effect in result.effects for v in effect.parameters.values()}
     if result.empirical is not None:
-        values |= {t.coefficient.variable: t.coefficient.value for t in result.empirical.terms}
+        parts = [v for t in result.empirical.terms for v in (t.coefficient, *t.shapes.values())]
+        values |= {v.variable: v.value for v in parts}
     wanted = [f"{slot}.{name}" for slot, names in SLOTS.items() for name in names]
     known = read_description(fmu).variables
     outputs = tuple(name for name in wanted if name in known)

@@ -45,6 +45,18 @@ def test_the_clean_signals_have_no_finding() -> None:
     assert told(signals()) == set()
 
 
+@pytest.mark.parametrize("first", [0.0, 30.0])
+def test_a_command_that_is_there_from_the_first_sample_is_answered_there(first: float) -> None:
+    command = np.where(TIME < 2.0, first, np.where(TIME < 4.0, -20.0, 10.0))
+    kick = np.zeros(TIME.size)
+    for at in (0, 2000, 4000):
+        kick[at + 1 :] += 40.0 * np.exp(-np.arange(TIME.size - at - 1) / 3.0)  # the first sample is at rest
+    current = kick + np.random.default_rng(1).normal(0.0, 0.05, TIME.size)
+    own = {**signals(), "w_cmd": (command, "rad/s"), "i": (current, "A")}
+    del own["w"], own["phi"]
+    assert (("i", "step") in told(own)) == (first == 0.0)  # without a command something else switched it
+
+
 def test_an_angle_that_wraps_is_named_with_its_period() -> None:
     (finding,) = found(changed("phi", np.mod(signals()["phi"][0], 2.0 * np.pi)))
     assert (finding.channel, finding.kind) == ("phi", "wrapped")

@@ -320,6 +320,12 @@ def test_the_lead_in_counts(folder: Path) -> None:
     assert len(digests) == 3
 
 
+def test_the_start_values_of_a_recording_count(folder: Path) -> None:
+    recording = loaded(folder, valid()).fit[0]
+    starts: list[dict[str, float]] = [{}, {"motor.gain": 2.0}, {"motor.gain": 3.0}, {"motor.J": 2.0}]
+    assert len({digest_of_recording(replace(recording, start=start)) for start in starts}) == 4
+
+
 def test_stages_are_asked_in_their_order_and_with_one_version(folder: Path) -> None:
     for name in ("one", "two"):
         (folder / f"{name}.toml").write_text(toml(valid()))

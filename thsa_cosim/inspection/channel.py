@@ -55,13 +55,17 @@ class Channel:
 
     @cached_property
     def jumps(self) -> FloatArray:
-        """Times in s at which a command jumps; none for a sensor's signal, or one that jumps all the time."""
+        """Times in s at which a command jumps; none for a sensor's signal, or one that jumps all the time.
+
+        One that is not zero when the recording begins jumps there: what it drives may have been at rest.
+        """
         change = np.abs(np.diff(self.plain))
         large = change > _JUMP * self.range
         # The noise, which takes longest to find, comes last.
         if not 0 < np.count_nonzero(large) < _OFTEN * change.size or not (self.drawn or self.silent):
             return np.empty(0)
-        return self.time[1:][large]
+        begins = abs(float(self.plain[0])) > _JUMP * self.range
+        return np.concatenate((self.time[: int(begins)], self.time[1:][large]))
 
     @cached_property
     def step(self) -> float:

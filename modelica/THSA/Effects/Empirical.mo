@@ -1,5 +1,5 @@
 within THSA.Effects;
-block Empirical "Polynomial in speed, position and load, for what no effect with a name explains"
+block Empirical "Terms in speed, position, distance and load, for what no effect with a name explains"
   extends THSA.Interfaces.FrictionEffect;
   parameter Real k_1 = 0 "Coefficient of 1";
   parameter Real k_vv = 0 "Coefficient of v |v|";
@@ -13,9 +13,22 @@ block Empirical "Polynomial in speed, position and load, for what no effect with
   parameter Real k_Ns = 0 "Coefficient of |N| sgn(v)";
   parameter Real k_Nv = 0 "Coefficient of |N| v";
   parameter Real k_NNs = 0 "Coefficient of N^2 sgn(v)";
+  parameter Real k_a = 0 "Coefficient of |v|";
+  parameter Real k_f = 0 "Coefficient of exp(-|v|/v_f) sgn(v)";
+  parameter Real v_f(min=1e-12) = 1 "Speed over which that falls";
+  parameter Real k_d = 0 "Coefficient of exp(-d/d_f) sgn(v) with the distance d since the start";
+  parameter Real d_f(min=1e-12) = 1 "Distance over which that falls";
+  parameter Real k_sin = 0 "Coefficient of sin(w z)";
+  parameter Real k_cos = 0 "Coefficient of cos(w z)";
+  parameter Real w = 1 "Wave number";
+  Real d(start=0, fixed=true, nominal=1e-2) "Distance travelled";
 equation
+  der(d) = noEvent(abs(v));
   F = k_1 + (k_vv*v*s + k_vvv*v^2)*v + (k_z + k_zz*z + (k_zs + k_zzs*z)*s + k_zv*v)*z
-    + k_N*N + (k_Ns*s + k_Nv*v)*noEvent(abs(N)) + k_NNs*N^2*s;
+    + k_N*N + (k_Ns*s + k_Nv*v)*noEvent(abs(N)) + k_NNs*N^2*s + k_a*noEvent(abs(v))
+    + (if k_f > 0 or k_f < 0 then k_f*exp(-noEvent(abs(v))/v_f)*s else 0)
+    + (if k_d > 0 or k_d < 0 then k_d*exp(-d/d_f)*s else 0)
+    + (if k_sin > 0 or k_sin < 0 or k_cos > 0 or k_cos < 0 then k_sin*sin(w*z) + k_cos*cos(w*z) else 0);
   annotation(Documentation(info="<html><p>No physics is meant by it: terms are chosen by what the recordings show, one coefficient
 each.</p></html>"));
 end Empirical;

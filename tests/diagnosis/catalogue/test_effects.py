@@ -8,9 +8,9 @@ import pytest
 from reference.rig import Rig, rig_at
 from scipy.optimize import brentq
 
-from thsa_cosim.diagnosis import known_effects
+from thsa_cosim.diagnosis import Effect, known_effects
 from thsa_cosim.diagnosis.catalogue.superset import build_superset
-from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL, LIBRARY
+from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL
 from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import Signals
 
@@ -25,7 +25,7 @@ COMMAND = np.interp(TIME, [0.1, 0.3, 0.9, 1.3, 1.7, 1.9], [0.0, SPEED, SPEED, -S
 @pytest.fixture(scope="module")
 def superset(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
     folder = tmp_path_factory.mktemp("superset")
-    effects = [*known_effects().values(), EMPIRICAL]
+    effects = [*known_effects().values(), *EMPIRICAL]
     fmu, *_ = build_superset("Actuator", ROOT / "modelica" / "THSA", effects, folder)
     with Plant.open(fmu) as plant:
         yield plant
@@ -312,8 +312,34 @@ def test_friction_follows_its_law_of_speed_position_and_load(superset: Plant, bl
     np.testing.assert_allclose(quantities["F"], expected, atol=1e-6 * np.ptp(expected))
 
 
+def distance(q: Mapping[str, np.ndarray]) -> np.ndarray:
+    speed = np.abs(q["v"])
+    return np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * 1e-3])
+
+
+def energy(q: Mapping[str, np.ndarray], fading: float) -> np.ndarray:
+    left = np.zeros(TIME.size)
+    share = np.exp(-1e-3 / fading)
+    for k in range(TIME.size - 1):
+        left[k + 1] = left[k] * share + 0.5e-3 * (q["P"][k] * share + q["P"][k + 1])
+    return left
+
+
+WAVE = 3e3
+#: Where a term is tried, its output, and what it is with the shapes below.
+SHAPES = {"v_f": 2e-3, "d_f": 3e-3, "w": WAVE, "n": 2.0, "i_s": 0.5, "T_f": 0.8}
+PLACES = {
+    "Empirical": ("screwEffect", "F"),
+    "EmpiricalDeflection": ("contactEffect", "e"),
+    "EmpiricalHeating": ("windingEffect", "g_R"),
+    "EmpiricalTorqueConstant": ("torqueEffect", "g_t"),
+    "EmpiricalVoltage": ("inverterEffect", "du"),
+    "EmpiricalSensor": ("currentSensorEffect", "d"),
+}
+READ = {"screw": "vszN", "contact": ("phi",), "winding": "P", "torque": ("i_q",), "inverter": ("i_q",)}
 TERMS: dict[str, Law] = {
-    "1": lambda q: np.ones_like(q["v"]),
+    "1": lambda q: np.ones(TIME.size),
+    "|v|": lambda q: np.abs(q["v"]),
     "v |v|": lambda q: q["v"] * np.abs(q["v"]),
     "v^3": lambda q: q["v"] ** 3,
     "z": lambda q: q["z"],
@@ -325,19 +351,52 @@ TERMS: dict[str, Law] = {
     "|N| sgn(v)": lambda q: np.abs(q["N"]) * q["s"],
     "|N| v": lambda q: np.abs(q["N"]) * q["v"],
     "N^2 sgn(v)": lambda q: q["N"] ** 2 * q["s"],
+    "exp(-|v|/{v_f}) sgn(v)": lambda q: np.exp(-np.abs(q["v"]) / SHAPES["v_f"]) * q["s"],
+    "exp(-d/{d_f}) sgn(v)": lambda q: np.exp(-distance(q) / SHAPES["d_f"]) * q["s"],
+    "sin({w} z)": lambda q: np.sin(WAVE * q["z"]),
+    "cos({w} z)": lambda q: np.cos(WAVE * q["z"]),
+    "sin({n} phi)": lambda q: np.sin(2.0 * q["phi"]),
+    "(cos({n} phi) - 1)": lambda q: np.cos(2.0 * q["phi"]) - 1.0,
+    "E in the resistance": lambda q: energy(q, SHAPES["T_f"]),
+    "E in the flux": lambda q: energy(q, SHAPES["T_f"]),
+    "|i_q| in the torque constant": lambda q: np.abs(q["i_q"]),
+    "i_q^2 in the torque constant": lambda q: q["i_q"] ** 2,
+    "|i_q| in the back-EMF": lambda q: np.abs(q["i_q"]),
+    "i_q^2 in the back-EMF": lambda q: q["i_q"] ** 2,
+    "tanh(i_q/{i_s})": lambda q: np.tanh(q["i_q"] / SHAPES["i_s"]),
+    "i_q |i_q|": lambda q: q["i_q"] * np.abs(q["i_q"]),
+    "u": lambda q: q["u"],
+    "u |u|": lambda q: q["u"] * np.abs(q["u"]),
 }
+#: How large a term is made.
+SIZES = {"F": 200.0, "e": 1e-6, "g_R": 0.05, "g_psi": 0.01, "g_t": 0.02, "g_e": 0.02, "du": 2.0, "d": 0.1}
 
 
-@pytest.mark.parametrize("coefficient", LIBRARY)
-def test_a_term_of_the_empirical_law_is_what_its_name_says(superset: Plant, coefficient: str):
-    term = TERMS[LIBRARY[coefficient][0]]
-    names = {q: f"screwEffect.{q}" for q in ("v", "s", "z", "N")}
+@pytest.mark.parametrize("effect", EMPIRICAL, ids=[e.name for e in EMPIRICAL])
+def test_a_term_of_the_empirical_law_is_what_its_text_says(superset: Plant, effect: Effect):
+    (variant,) = effect.variants
+    slot, usual = PLACES[variant.block]
+    names = {q: f"{slot}.{q}" for q in READ.get(slot.removesuffix("Effect"), ("u",))}
     plain = run(superset, {}, tuple(names.values()))
-    size = 200.0 / np.abs(term({q: plain[n] for q, n in names.items()})).max()  # N
-    found = run(superset, {f"screwEffect.empirical.{coefficient}": size}, (*names.values(), "screwEffect.F"))
-    expected = size * term({q: found[n] for q, n in names.items()})
-    # v |v| stands for v v sgn(v), whose sign is a straight line within the friction's own width
-    np.testing.assert_allclose(found["screwEffect.F"], expected, atol=1e-3)
+    shapes = {
+        f"{slot}.{variant.component}.{p.name}": SHAPES[p.name]
+        for p in variant.parameters
+        if p.role == "shape"
+    }
+    for p in variant.parameters:
+        if p.role == "shape":
+            continue
+        term = TERMS[p.description.removeprefix("coefficient of ")]
+        output = {"k_psi": "g_psi", "e_a": "g_e", "e_ii": "g_e"}.get(p.name, usual)
+        size = SIZES[output] / np.abs(term({q: plain[n] for q, n in names.items()})).max()
+        values = {f"{slot}.{variant.component}.{p.name}": size, **shapes}
+        found = run(superset, values, (*names.values(), f"{slot}.{output}"))
+        expected = size * term({q: found[n] for q, n in names.items()})
+        # v |v| stands for v v sgn(v), whose sign is a straight line within the friction's own width; distance and
+        # energy are summed from samples
+        summed = p.name in ("k_d", "k_R", "k_psi")
+        allowed = (1e-2 if summed else 5e-6) * SIZES[output]
+        np.testing.assert_allclose(found[f"{slot}.{output}"], expected, atol=allowed)
 
 
 def test_run_in_falls_with_the_distance_whatever_the_direction(superset: Plant):

@@ -302,6 +302,21 @@ def test_effects_that_are_both_needed_stay():
     assert notes == []
 
 
+@pytest.mark.parametrize(("share", "stays"), [(0.009, False), (0.011, True)])
+def test_an_effect_that_explains_less_than_a_hundredth_of_all_is_dropped(
+    share: float, stays: bool, monkeypatch: pytest.MonkeyPatch
+):
+    own, declared, weights, accepted, final, held = accepted_by_hand(
+        {**WINDAGE, **STRIBECK}, "windage:motor", "stribeck:motor"
+    )
+    explained = float(weights.base_held @ weights.base_held - held @ held)
+    assert explained > 100.0
+    monkeypatch.setattr(room, "block_gains", lambda *_: np.full(10, 0.1 * share * explained))
+    kept, _, _, notes = prune(own, declared, weights, accepted, final, held)
+    assert (len(kept) == 2) is stays
+    assert bool(notes) is not stays
+
+
 RIPPLE = {
     "motorEffect.cogging.a_s": 0.25, "motorEffect.cogging.a_c": -0.1, "motorEffect.cogging.n": 12.0,
     "motorEffect.cogging.a_s3": 0.1, "motorEffect.cogging.n_3": 18.0,

@@ -30,6 +30,8 @@ def test_the_best_two_starts_of_the_best_six_effects_are_refined():
     assert worth_refining(several, 17.0) == [several[0], several[1], several[3]]
     late = [*made[:6], proposal("e0", 900.0), proposal("e7", 900.0)]
     assert worth_refining(late, 17.0) == late[:7], "a further start of an effect that is in"
+    later = [*made[:7], proposal("e0", 900.0)]
+    assert worth_refining(later, 17.0) == [*made[:6], later[7]], "behind an effect that is not"
 
 
 def test_what_promises_no_more_than_chance_or_little_beside_the_best_is_not_refined():

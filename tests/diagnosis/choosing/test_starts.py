@@ -32,6 +32,38 @@ def test_points_fill_the_range_by_its_logarithm_where_it_is_positive() -> None:
     assert np.histogram(places, bins=4, range=(-2.0, 4.0))[0].min() >= 7
 
 
+def test_a_range_that_begins_at_zero_is_searched_linearly() -> None:
+    candidate: Any = SimpleNamespace(shapes=(shape("z", 0.0, 4.0),))
+    found = np.array([p["z"] for p in points_around(candidate, {"z": 1.0}, 1.0, 32)])
+    assert np.histogram(found, bins=4, range=(0.0, 4.0))[0].min() >= 7
+
+
+@pytest.mark.parametrize(
+    "shapes",
+    [
+        (),
+        (SimpleNamespace(name="n", variable="n", lower=1.0, upper=100.0, scanned=True),),
+        (
+            SimpleNamespace(name="v_S", variable="v_S", lower=0.01, upper=1.0, scanned=False),
+            SimpleNamespace(name="n", variable="known", lower=1.0, upper=2.0, scanned=False),
+        ),
+    ],
+    ids=["none", "a wave number", "one that the base holds"],
+)
+def test_candidates_without_shapes_of_their_own_to_search_are_left_out(
+    monkeypatch: pytest.MonkeyPatch, shapes: tuple[Any, ...]
+) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr(
+        "thsa_cosim.diagnosis.choosing.starts.propose", lambda bench, base, rows: asked.extend(rows) or []
+    )
+    candidate = SimpleNamespace(key="a", shapes=shapes)
+    proposals: Any = [SimpleNamespace(candidate=candidate, shapes={"v_S": 0.1, "n": 1.5}, gain=100.0)]
+    base: Any = SimpleNamespace(unknowns=SimpleNamespace(named=lambda vector: {"known": 1.5}), vector=())
+    assert further_starts(None, base, proposals) == []  # type: ignore[arg-type]
+    assert asked == []
+
+
 @pytest.mark.parametrize("centre", [0.02, 1.0, 90.0])
 def test_a_search_around_a_point_stays_within_the_range(centre: float) -> None:
     candidate: Any = SimpleNamespace(shapes=(shape("v_S", 0.01, 100.0),))

@@ -19,6 +19,9 @@ from thsa_cosim.export.flatten import locate
 #: Extended models are named after their own class; the system model of the shipped package goes by the package's name.
 KNOWN_AS = {"THSA.Actuator": "THSA"}
 
+#: What the terms of an empirical law go by in the name of a model; the term follows after a slash.
+EMPIRICAL_NAME = "empirical"
+
 
 def extended_class(
     name: str,
@@ -34,10 +37,10 @@ def extended_class(
     classes that are in no package (`source_beside`).
     """
     slots = {candidate.slot.name: candidate.slot for candidate in candidates}
-    members = {
-        name: tuple({c.component: c for c in candidates if c.slot.name == name}.values()) for name in slots
-    }
-    blocks = [_block(slot, members[name], values or {}) for name, slot in slots.items()]
+    blocks = [
+        _block(slot, [c for c in candidates if c.slot.name == name], values or {})
+        for name, slot in slots.items()
+    ]
     redeclared = ",\n    ".join(f"redeclare {_block_name(slot)} {slot.component}" for slot in slots.values())
     return (
         f'within ;\n{beside}model {name} "{description or base}"\n'
@@ -50,20 +53,23 @@ def _block_name(slot: Slot) -> str:
     return slot.name[0].upper() + slot.name[1:] + "Effects"
 
 
-def _block(slot: Slot, members: Sequence[Candidate], values: Mapping[str, float]) -> str:
-    lines = [f'  block {_block_name(slot)} "{", ".join(m.effect.title for m in members)}"']
+def _block(slot: Slot, candidates: Sequence[Candidate], values: Mapping[str, float]) -> str:
+    """The block of a slot; candidates of one component, such as the terms of a law, set its parameters together."""
+    members = {c.component: c for c in candidates}
+    titles = dict.fromkeys(c.effect.title for c in members.values())
+    lines = [f'  block {_block_name(slot)} "{", ".join(titles)}"']
     lines.append(f"    extends THSA.Interfaces.{slot.interface};")
-    for member in members:
-        set_values = {p.name: values.get(p.variable, p.at_start) for p in member.all_parameters}
+    for component, member in members.items():
+        own = {p.name: p for c in candidates if c.component == component for p in c.all_parameters}
         modifiers = ", ".join(
-            f'{p.name}(unit="{p.unit}") = {set_values[p.name]!r}' for p in member.all_parameters
+            f'{p.name}(unit="{p.unit}") = {values.get(p.variable, p.at_start)!r}' for p in own.values()
         )
-        lines.append(f"    {member.qualified_block} {member.component}({modifiers});")
+        lines.append(f"    {member.qualified_block} {component}({modifiers});")
     lines.append("  equation")
-    for member in members:
-        lines += [f"    {member.component}.{v} = {v};" for v in INPUTS[slot.interface]]
+    for component in members:
+        lines += [f"    {component}.{v} = {v};" for v in INPUTS[slot.interface]]
     for output in OUTPUTS[slot.interface]:
-        lines.append(f"    {output} = {' + '.join(f'{m.component}.{output}' for m in members)};")
+        lines.append(f"    {output} = {' + '.join(f'{component}.{output}' for component in members)};")
     return "\n".join([*lines, f"  end {_block_name(slot)};\n"])
 
 
@@ -83,7 +89,7 @@ def write_extended_model(
     The FMU is for this machine: compilers of other platforms are only started when somebody asks for them.
     """
     base = qualified(model, package)
-    effects = list(dict.fromkeys(c.effect.name for c in candidates))
+    effects = list(dict.fromkeys(c.effect.name.split("/")[0] for c in candidates))
     own = KNOWN_AS.get(base, base.split(".")[-1])
     name = "_and_".join([f"{own}_with_{effects[0]}", *effects[1:]]).replace("-", "_")
     titles = ", ".join(dict.fromkeys(c.effect.title for c in candidates))

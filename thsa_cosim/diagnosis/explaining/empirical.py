@@ -1,11 +1,12 @@
 """An empirical law where no effect of the catalogue explains what is left: sparse regression over the slots' signals.
 
-Terms of a small polynomial in speed, position and load join the model one by one by the same forward selection, on the
-simulated closed loop and with the same gate on the held-out recordings, as effects do (S. Brunton, J. Proctor,
-J. N. Kutz, PNAS 113 (2016) 3932, for sparse laws from a library of terms).
-A law is a description: it gets no effect's name.
+Terms (powers of what a slot reads, falls over speed and distance, waves over the position, energies that fade) join
+the model one by one by the same forward selection, on the simulated closed loop and with the same gate on the held-out
+recordings, as effects do (S. Brunton, J. Proctor, J. N. Kutz, PNAS 113 (2016) 3932, for sparse laws from a library of
+terms). A law is a description: it gets no effect's name.
 """
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -13,51 +14,117 @@ from pathlib import Path
 from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Variant
-from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, source_beside, write_extended
+from thsa_cosim.diagnosis.catalogue.extend import (
+    EMPIRICAL_NAME,
+    extended_class,
+    qualified,
+    source_beside,
+    write_extended,
+)
 from thsa_cosim.diagnosis.catalogue.slots import find_slots
-from thsa_cosim.diagnosis.catalogue.superset import scales_of
+from thsa_cosim.diagnosis.catalogue.superset import scales_of, slot_signals
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import values_of
+from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
+from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified
 from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
-from thsa_cosim.diagnosis.results import EmpiricalLaw, EmpiricalTerm
+from thsa_cosim.diagnosis.results import EmpiricalLaw, EmpiricalTerm, Value
 from thsa_cosim.export import export_fmu
 from thsa_cosim.export.compile import native_platform
 from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
 
 #: At most so many terms: a law of more says no more than a plot.
 _TERMS = 3
-#: Coefficient of ``THSA.Effects.Empirical`` → its term and the coefficient's dimension.
-LIBRARY = {
-    "k_1": ("1", "F"),
-    "k_vv": ("v |v|", "F/V^2"),
-    "k_vvv": ("v^3", "F/V^3"),
-    "k_z": ("z", "F/Z"),
-    "k_zz": ("z^2", "F/Z^2"),
-    "k_zs": ("z sgn(v)", "F/Z"),
-    "k_zzs": ("z^2 sgn(v)", "F/Z^2"),
-    "k_zv": ("z v", "F/Z/V"),
-    "k_N": ("N", "1"),
-    "k_Ns": ("|N| sgn(v)", "1"),
-    "k_Nv": ("|N| v", "1/V"),
-    "k_NNs": ("N^2 sgn(v)", "1/F"),
-}
-EMPIRICAL = Effect(
-    name="empirical",
-    title="Empirical law in speed, position and load",
-    physics="F = sum of k_j phi_j(v, z, N)",
-    source="Brunton, Proctor, Kutz, PNAS 113 (2016) 3932",
-    signature="whatever structure the effects with a name leave",
-    variants=tuple(
-        Variant(
-            "FrictionEffect", "Empirical", (EffectParameter(name, dimension, 0.02, f"coefficient of {term}"),)
-        )
-        for name, (term, dimension) in LIBRARY.items()
+
+
+def _k(name: str, dimension: str, term: str, typical: float = 0.02) -> EffectParameter:
+    return EffectParameter(name, dimension, typical, f"coefficient of {term}")
+
+
+def _shape(
+    name: str, dimension: str, what: str, starts: tuple[float, ...], scanned: bool = False
+) -> EffectParameter:
+    low, high = (0.1, 1e3) if scanned else (1e-3, 1e3)
+    return EffectParameter(
+        name, dimension, 1.0, what, role="shape", lower=low, upper=high, starts=starts, scanned=scanned
+    )
+
+
+_FALL = _shape("v_f", "V", "speed over which it falls", (0.03, 0.1, 0.3))
+_DISTANCE = _shape("d_f", "D", "distance over which it falls", (0.1, 0.5))
+_WAVE = _shape("w", "W", "wave number", (1.0, 2.0), scanned=True)
+_PERIODS = _shape("n", "1", "periods per revolution", (1.0, 2.0))
+_SIGN = _shape("i_s", "I", "current over which the sign turns", (0.01, 0.05))
+_FADING = EffectParameter(
+    "T_f", "s", 10.0, "time over which E fades", role="shape", lower=0.5, upper=1e5, starts=(5.0, 100.0)
+)
+#: Interface and class → the parameters of every term.
+_LIBRARY: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
+    ("FrictionEffect", "Empirical"): (
+        (_k("k_1", "F", "1"),),
+        (_k("k_a", "F/V", "|v|"),),
+        (_k("k_vv", "F/V^2", "v |v|"),),
+        (_k("k_vvv", "F/V^3", "v^3"),),
+        (_k("k_z", "F/Z", "z"),),
+        (_k("k_zz", "F/Z^2", "z^2"),),
+        (_k("k_zs", "F/Z", "z sgn(v)"),),
+        (_k("k_zzs", "F/Z^2", "z^2 sgn(v)"),),
+        (_k("k_zv", "F/Z/V", "z v"),),
+        (_k("k_N", "1", "N"),),
+        (_k("k_Ns", "1", "|N| sgn(v)"),),
+        (_k("k_Nv", "1/V", "|N| v"),),
+        (_k("k_NNs", "1/F", "N^2 sgn(v)"),),
+        (_k("k_f", "F", "exp(-|v|/{v_f}) sgn(v)"), _FALL),
+        (_k("k_d", "F", "exp(-d/{d_f}) sgn(v)"), _DISTANCE),
+        (_k("k_sin", "F", "sin({w} z)", 0.01), _k("k_cos", "F", "cos({w} z)", 0.01), _WAVE),
     ),
+    ("ContactEffect", "EmpiricalDeflection"): (
+        (_k("k_sin", "m", "sin({n} phi)", 2e-6), _k("k_cos", "m", "(cos({n} phi) - 1)", 2e-6), _PERIODS),
+    ),
+    ("HeatingEffect", "EmpiricalHeating"): (
+        (_k("k_R", "1/J", "E in the resistance", 2e-4), _FADING),
+        (_k("k_psi", "1/J", "E in the flux", -5e-5), _FADING),
+    ),
+    ("TorqueConstantEffect", "EmpiricalTorqueConstant"): (
+        (_k("k_a", "1/I", "|i_q| in the torque constant"),),
+        (_k("k_ii", "1/I^2", "i_q^2 in the torque constant"),),
+        (_k("e_a", "1/I", "|i_q| in the back-EMF"),),
+        (_k("e_ii", "1/I^2", "i_q^2 in the back-EMF"),),
+    ),
+    ("VoltageEffect", "EmpiricalVoltage"): (
+        (_k("k_1", "U", "1", 0.3),),
+        (_k("k_s", "U", "tanh(i_q/{i_s})", 0.3), _SIGN),
+        (_k("k_ii", "U/I^2", "i_q |i_q|", 0.3),),
+    ),
+    ("SensorEffect", "EmpiricalSensor"): (
+        (_k("k_1", "I", "1", 0.01),),
+        (_k("k_u", "1", "u", 0.01),),
+        (_k("k_uu", "1/I", "u |u|", 0.01),),
+    ),
+}
+
+
+def _effect(interface: str, block: str, parameters: tuple[EffectParameter, ...]) -> Effect:
+    return Effect(
+        name=f"{EMPIRICAL_NAME}/{block}.{parameters[0].name}",
+        title="Term of an empirical law",
+        physics=f"{parameters[0].description} in a sum of such terms",
+        source="Brunton, Proctor, Kutz, PNAS 113 (2016) 3932",
+        signature="whatever structure the effects with a name leave",
+        variants=(Variant(interface, block, parameters),),
+    )
+
+
+#: Every term is an effect of its own: several may join in one place, and none is another one's form.
+EMPIRICAL = tuple(
+    _effect(interface, block, parameters)
+    for (interface, block), terms in _LIBRARY.items()
+    for parameters in terms
 )
 
 
@@ -74,21 +141,20 @@ class LawSearch:
     after: Identified
     folder: Path
     open_runner: OpenRunner
+    machine: Machine
 
     def find(self) -> Attribution | None:
         """The terms that pass the gate; None if there is none, or nothing can be simulated."""
         assert self.spec.model is not None
         base = qualified(self.spec.model, self.spec.package)
-        slots = tuple(
-            s for s in find_slots(self.spec.model, self.spec.package) if s.interface == "FrictionEffect"
-        )
+        slots = find_slots(self.spec.model, self.spec.package)
         simulation = self.scenario.simulation
         own = [*(effect.candidate for effect in self.known), *(s.candidate for s in self.accepted)]
         shapes = {v: x for effect in self.known for v, x in effect.given.items()} | fixed_shapes(
             self.accepted
         )
         name = f"{base.replace('.', '_')}_empirical"
-        terms = candidates_of((EMPIRICAL,), slots, {})
+        terms = candidates_of(EMPIRICAL, slots, {})
         beside = source_beside(self.spec.model, self.spec.package)
         source = extended_class(name, base, [*own, *terms], shapes, beside=beside)
         file = write_extended(self.folder, name, source)
@@ -99,14 +165,25 @@ class LawSearch:
             platforms=(native_platform().fmi3,),
         )
         trials = with_fmu(self.trials, fmu)
-        scales = scales_of(
-            fmu, slots, [t.case for t in trials if t.part == "fit"], partial(self.open_runner, simulation)
-        )
-        candidates = candidates_of((EMPIRICAL,), slots, scales)
+        cases = [t.case for t in trials if t.part == "fit"]
+        opening = partial(self.open_runner, simulation)
+        scales = scales_of(fmu, slots, cases, opening)
+        candidates = candidates_of(EMPIRICAL, slots, scales)
         with self.open_runner(simulation, [t.experiment for t in trials]) as runner:
             bench = Bench(runner, trials)
+            unknowns = self._unknowns()
+            scan = wave_number_finder(
+                bench, slots, lambda values: slot_signals(slots, cases, values, opening), self.machine
+            )
             found = attribute(
-                bench, self._unknowns(), candidates, lambda _: {}, seed=self.scenario.seed, most=_TERMS
+                bench,
+                unknowns,
+                candidates,
+                scan,
+                start=self.after.fit.at(unknowns.names),
+                seed=self.scenario.seed,
+                most=_TERMS,
+                machine=self.machine,
             )
         return found if found is not None and found.accepted else None
 
@@ -120,13 +197,25 @@ class LawSearch:
 def law_of(found: Attribution, fit: Fit, *, added: bool) -> EmpiricalLaw:
     """A search's accepted terms in the words of the result, with the values of ``fit``."""
     values = values_of(fit, declared=False)
-    terms = tuple(
-        EmpiricalTerm(
-            scored.candidate.slot.name, LIBRARY[p.name][0], replace(values[p.variable], variable=p.variable)
-        )
-        for scored in found.accepted
-        for p in scored.candidate.coefficients
-    )
+    terms = tuple(term for scored in found.accepted for term in _terms(scored, values))
     held = found.base_validate
     gain = float(held @ held - found.final_validate @ found.final_validate)
     return EmpiricalLaw(terms, gain, added)
+
+
+def _terms(scored: Scored, values: Mapping[str, Value]) -> Iterator[EmpiricalTerm]:
+    """What one accepted effect adds: a term for each of its coefficients, with its shapes put in."""
+    candidate = scored.candidate
+    texts = {p.name: p.description.removeprefix("coefficient of ") for p in candidate.variant.parameters}
+    shapes = {
+        p.name: replace(
+            values.get(p.variable, Value(scored.proposal.shapes.get(p.name, p.at_start), p.unit, 0.0)),
+            variable=p.variable,
+            role=p.role,
+        )
+        for p in candidate.shapes
+    }
+    for p in candidate.coefficients:
+        text = texts[p.name].format(**{name: f"{shape.value:.4g}" for name, shape in shapes.items()})
+        value = replace(values[p.variable], variable=p.variable)
+        yield EmpiricalTerm(candidate.slot.name, text, value, shapes)

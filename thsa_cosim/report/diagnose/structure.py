@@ -98,8 +98,8 @@ def _law_table(law: Json) -> Table:
         else "not added to the model (diagnose.empirical = true adds it)"
     )
     note = (
-        f"v, z, N: speed, position and load in the slot; held-out gain {number(law.get('held_out_gain'), 3)} noise"
-        f" variances; {fate}. The law is descriptive, not physical."
+        "v, z, N, d: speed, position, load and distance in the slot, in its units; held-out gain"
+        f" {number(law.get('held_out_gain'), 3)} noise variances; {fate}. The law is descriptive, not physical."
     )
     return Table("Empirical law of the unexplained residual ± one standard error", columns, rows, note)
 

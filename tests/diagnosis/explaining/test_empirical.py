@@ -1,0 +1,95 @@
+"""The terms of an empirical law as candidates, in a model's name and in the words of the result."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thsa_cosim.diagnosis.catalogue import extend
+from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
+from thsa_cosim.diagnosis.catalogue.slots import Slot
+from thsa_cosim.diagnosis.choosing.attribution import _is_taken
+from thsa_cosim.diagnosis.choosing.forms import _is_form
+from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.choosing.selection import REFINED, worth_refining
+from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL, law_of
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
+
+PACKAGE = Path(__file__).parents[3] / "modelica" / "THSA"
+SCREW = Slot("screw", "FrictionEffect", {"v": "m/s", "z": "m", "N": "N", "F": "N"})
+CANDIDATES = {c.coefficients[0].name: c for c in candidates_of(EMPIRICAL, (SCREW,), {})}
+
+
+def proposal(name: str, gain: float) -> Proposal:
+    one = np.ones((1, 1))
+    return Proposal(CANDIDATES[name], {}, one, gain, one[0], 1.0, one)
+
+
+def test_a_term_neither_takes_the_place_of_another_one_nor_is_its_form():
+    first, second = CANDIDATES["k_vv"], CANDIDATES["k_Ns"]
+    assert _is_taken(first, first)
+    assert not _is_taken(second, first)
+    assert not _is_form(second, first)
+
+
+def test_several_terms_of_a_place_are_refined():
+    found = worth_refining([proposal(n, 100.0 - k) for k, n in enumerate(CANDIDATES)], 1.0)
+    assert len(found) == REFINED
+
+
+def test_a_model_with_several_terms_is_named_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    monkeypatch.setattr(extend, "export_fmu", lambda *_, output, **__: output)
+    terms = [CANDIDATES["k_vv"], CANDIDATES["k_Ns"]]
+    file, fmu = extend.write_extended_model(tmp_path, "THSA.Actuator", PACKAGE, terms, {})
+    assert (file.name, fmu.name) == ("THSA_with_empirical.mo", "THSA_with_empirical.fmu")
+    source = file.read_text()
+    assert source.count("THSA.Effects.Empirical empirical(") == 1, "one block holds both terms"
+    assert "k_vv(" in source
+    assert "k_Ns(" in source
+
+
+def found_terms(**values: float) -> Any:
+    """An attribution that accepted a fall over the speed and a wave whose order is known."""
+    members = tuple(
+        Unknown(
+            f"screwEffect.empirical.{n}",
+            f"screwEffect.empirical.{n}",
+            "N",
+            x,
+            1.0,
+            1.0,
+            -1e9,
+            1e9,
+            None,
+            False,
+        )
+        for n, x in values.items()
+    )
+    fit = SimpleNamespace(
+        unknowns=Unknowns(members),
+        vector=np.array([u.start for u in members]),
+        inflation=1.0,
+        stderr=lambda _: np.full(len(members), 0.1),
+    )
+    accepted = [
+        SimpleNamespace(candidate=CANDIDATES[n], proposal=SimpleNamespace(shapes=shapes))
+        for n, shapes in (("k_f", {"v_f": 1e-3}), ("k_sin", {"w": 628.3}))
+    ]
+    held = np.ones(10)
+    return SimpleNamespace(final=fit, accepted=accepted, base_validate=3.0 * held, final_validate=held)
+
+
+def test_a_law_has_a_term_for_each_coefficient_with_its_shapes_put_in():
+    found = found_terms(k_f=300.0, v_f=1.2345e-3, k_sin=40.0, k_cos=-30.0)
+    law = law_of(found, found.final, added=True)
+    assert [(t.term, t.coefficient.value) for t in law.terms] == [
+        ("exp(-|v|/0.001234) sgn(v)", 300.0),
+        ("sin(628.3 z)", 40.0),
+        ("cos(628.3 z)", -30.0),
+    ]
+    assert law.terms[0].coefficient.variable == "screwEffect.empirical.k_f"
+    assert law.terms[0].shapes["v_f"].value == 1.2345e-3
+    assert law.terms[1].shapes["w"].value == 628.3, "an order of the machine is not fitted"
+    assert law.held_out_gain == pytest.approx(80.0)

@@ -365,6 +365,40 @@ TEXTS3 = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
+DRIVE2 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Drive" guid="{drive}" generationTool="a tool">
+ <CoSimulation modelIdentifier="drive2" canHandleVariableCommunicationStepSize="true"/>
+ <UnitDefinitions><Unit name="rad/s"><BaseUnit rad="1" s="-1"/></Unit><Unit name="rad"><BaseUnit rad="1"/></Unit>
+  <Unit name="A"><BaseUnit A="1"/></Unit><Unit name="N.m"><BaseUnit kg="1" m="2" s="-2"/></Unit>
+  <Unit name="kg.m2"><BaseUnit kg="1" m="2"/></Unit><Unit name="N.m/A"><BaseUnit kg="1" m="2" s="-2" A="-1"/></Unit>
+  <Unit name="A.s/rad"><BaseUnit A="1" s="1" rad="-1"/></Unit><Unit name="A/rad"><BaseUnit A="1" rad="-1"/></Unit>
+  <Unit name="N.m.s/rad"><BaseUnit kg="1" m="2" s="-1" rad="-1"/></Unit></UnitDefinitions>
+ <DefaultExperiment startTime="0" stopTime="4" stepSize="0.002"/>
+ <ModelVariables>
+  <ScalarVariable name="w" valueReference="0" causality="output"><Real unit="rad/s"/></ScalarVariable>
+  <ScalarVariable name="phi" valueReference="1" causality="output"><Real unit="rad"/></ScalarVariable>
+  <ScalarVariable name="i" valueReference="2" causality="output"><Real unit="A"/></ScalarVariable>
+  <ScalarVariable name="w_cmd" valueReference="3" causality="input"><Real start="0" unit="rad/s"/></ScalarVariable>
+  <ScalarVariable name="tau_load" valueReference="4" causality="input"><Real start="0" unit="N.m"/></ScalarVariable>
+  <ScalarVariable name="J" valueReference="5" causality="parameter" variability="fixed">
+   <Real start="0.02" min="1e-6" unit="kg.m2"/></ScalarVariable>
+  <ScalarVariable name="k_t" valueReference="6" causality="parameter" variability="fixed">
+   <Real start="0.5" unit="N.m/A"/></ScalarVariable>
+  <ScalarVariable name="K_p" valueReference="7" causality="parameter" variability="tunable">
+   <Real start="1" unit="A.s/rad"/></ScalarVariable>
+  <ScalarVariable name="K_i" valueReference="8" causality="parameter" variability="tunable">
+   <Real start="10" unit="A/rad"/></ScalarVariable>
+  <ScalarVariable name="tau_c" valueReference="9" causality="parameter" variability="fixed">
+   <Real start="0" unit="N.m"/></ScalarVariable>
+  <ScalarVariable name="b" valueReference="10" causality="parameter" variability="fixed">
+   <Real start="0" unit="N.m.s/rad"/></ScalarVariable>
+ </ModelVariables>
+ <ModelStructure><Outputs><Unknown index="1"/><Unknown index="2"/><Unknown index="3"/></Outputs>
+  <InitialUnknowns><Unknown index="1"/><Unknown index="2"/><Unknown index="3"/></InitialUnknowns></ModelStructure>
+</fmiModelDescription>
+"""
+
+
 def compiler() -> list[str] | None:
     """Return a C compiler's command, or None if there is none."""
     for name in ("gcc", "cc", "clang"):
@@ -462,6 +496,13 @@ def events2() -> Path:
 def lag1() -> Path:
     """The first-order lag of lag1.c, FMI 1.0 Co-Simulation."""
     return write_fmu(_folder() / "lag1.fmu", LAG1, library("lag1.c"), "lag1")
+
+
+@cache
+def drive2(*defines: str) -> Path:
+    """The speed-controlled drive of drive2.c, FMI 2.0 Co-Simulation of a foreign tool."""
+    name = "_".join(["drive2", *defines])
+    return write_fmu(_folder() / f"{name}.fmu", DRIVE2, library("drive2.c", *defines), "drive2")
 
 
 @cache

@@ -36,6 +36,17 @@ def test_the_error_of_a_foreign_fmus_step_is_told_next_to_the_noise(noise: float
     assert found.recording == "step"
 
 
+def test_without_a_sensor_the_range_counts() -> None:
+    found = CouplingError(
+        "ramp", {"w": 0.3, "zero": 0.2}, {}, {"w": "rad/s", "zero": "1"}, ranges={"w": 10.0}
+    )
+    assert found.worst == ("w", pytest.approx(0.03))
+    assert "0.3 rad/s rms, 3 % of its range (ramp)" in found.reason
+    assert found.note == f"WARNING: {found.reason}"
+    small = CouplingError("ramp", {"w": 0.05}, {}, {"w": "rad/s"}, ranges={"w": 10.0})
+    assert (small.reason, small.note) == ("", small.sentence())
+
+
 @pytest.mark.parametrize(
     "fmu", [lambda: lag2("EULER"), lambda: habits2("EULER", flags=""), lambda: lag2(tool="vendor")]
 )

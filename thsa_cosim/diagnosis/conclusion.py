@@ -48,7 +48,7 @@ from thsa_cosim.diagnosis.results import DiagnosisResult, EmpiricalLaw, Structur
 from thsa_cosim.export.compile import native_platform
 from thsa_cosim.identify import ForceBalance, force_balance
 from thsa_cosim.scenario import DiagnoseSpec, Scenario
-from thsa_cosim.study import Comparison, Study, reached
+from thsa_cosim.study import Comparison, CouplingError, Study, coupling_error, reached
 
 #: The folder of the superset inside a study.
 WORK = "superset"
@@ -106,6 +106,8 @@ class Conclusion:
         told = notes_on_hidden(hidden, after.fit, sure_after)
         sure_after = np.hypot(sure_after, widening(hidden, after.fit))
         balances = close_balances(scenario, self.spec)
+        coupled = self._coupled(after)
+        said = coupled.note if isinstance(coupled, CouplingError) else coupled
         return DiagnosisResult(
             title=scenario.title or scenario.path.stem,
             status="complete",
@@ -148,9 +150,26 @@ class Conclusion:
             threshold=found.rounds[0].threshold if found.rounds else 0.0,
             evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if changed else 0),
             failures=_failures(self.bench, *([before, after] if changed else [before])),
-            notes=(*self._notes(extended), *told),
+            notes=(*self._notes(extended), *told, *([said] if said else [])),
             data=with_slips(scenario.data, after, scenario.file_units),
             asked=scenario.table.model_dump(mode="json", by_alias=True, exclude_unset=True),
+            coupling=coupled if isinstance(coupled, CouplingError) else None,
+        )
+
+    def _coupled(self, model: Identified) -> CouplingError | str:
+        """What the communication step of a foreign FMU costs at the fit, on the first fit recording."""
+        trial = next(t for t in model.trials if t.part == "fit")
+        simulated = model.signals.get(trial.name)
+        if simulated is None:
+            return ""
+        return coupling_error(
+            self.scenario.fmu,
+            self.scenario.simulation,
+            trial.case.experiment(trial.name, None),
+            model.fit.unknowns.assignments(model.fit.vector, trial.group),
+            simulated,
+            {channel.name: channel.noise for channel in trial.case.channels},
+            self.study.open_runner,
         )
 
     def _declared(self) -> Identified:

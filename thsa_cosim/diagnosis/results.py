@@ -8,7 +8,7 @@ from typing import Any, Literal
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.inspection import Inspection
 from thsa_cosim.signals import Signals
-from thsa_cosim.study import ChannelError, Comparison
+from thsa_cosim.study import ChannelError, Comparison, CouplingError
 
 Verdict = Literal["missing-effect", "no-missing-effect", "unexplained-structure", "not-tested"]
 
@@ -247,3 +247,5 @@ class DiagnosisResult:
     """The scenario as it was asked for, in its tables: what the extended model is identified with again."""
     known: tuple[KnownEffect, ...] = ()
     """Effects of the declared model; their parameters stand among the declared ones by FMU variable, too."""
+    coupling: CouplingError | None = None
+    """What half the communication step changes at the last fit, of an FMU that depends on one."""

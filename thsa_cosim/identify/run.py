@@ -39,7 +39,7 @@ from thsa_cosim.inspection import (
     misfits,
 )
 from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario import Scenario
+from thsa_cosim.scenario import OpenRunner, Scenario
 from thsa_cosim.search import EvolutionSettings, Generation
 from thsa_cosim.study import (
     Case,
@@ -104,7 +104,7 @@ def identify(
                 search.try_parameters(engine)
                 search.search(engine)
                 search.validate(engine)
-            search.couple()
+            search.couple(study.open_runner)
             study.complete()
         except KeyboardInterrupt:
             search.interrupted = True
@@ -224,7 +224,7 @@ class _Search:
                 continue
             self._comparisons.append(compare_case(case, recording, "validate", outcome.signals))
 
-    def couple(self) -> None:
+    def couple(self, opening: OpenRunner) -> None:
         """Find out what coupling by steps costs at the first point's estimate, on its first recording."""
         point, found = self._points[0], self._found.get(0)
         if found is None or found.result is None or not found.signals:
@@ -238,6 +238,7 @@ class _Search:
             point.space.assignments(values, case.name),
             found.signals[0],
             {channel.name: channel.noise for channel in case.channels},
+            opening,
         )
         if isinstance(coupled, CouplingError):
             self._coupling = coupled

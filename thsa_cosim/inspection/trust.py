@@ -56,6 +56,12 @@ class Trust:
     verdict: Literal["explained", "not-explained"]
     reasons: tuple[str, ...] = ()
 
+    @classmethod
+    def of(cls, reasons: Sequence[str]) -> "Trust":
+        """The verdict that ``reasons`` lead to; empty ones do not count."""
+        kept = tuple(reason for reason in reasons if reason)
+        return cls("not-explained" if kept else "explained", kept[:_MOST_REASONS])
+
     def to_dict(self) -> dict[str, Any]:
         """Return ``trust`` of ``result.json``."""
         return {"verdict": self.verdict, "reasons": list(self.reasons)}

@@ -5,7 +5,7 @@ A run at half the steps, with the values that were found.
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +16,16 @@ from thsa_cosim.batch.own_step import moves_within, own_step
 from thsa_cosim.fmu import FmuDescription
 from thsa_cosim.fmu.inputs import is_ours
 from thsa_cosim.fmu.plant import VARIABLE_STEP
-from thsa_cosim.scenario import Executor, SimulationTable
+from thsa_cosim.scenario import Executor, OpenRunner, SimulationTable
 from thsa_cosim.scenario.handling import settle_handling
-from thsa_cosim.signals import Signals
+from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.system.description import SystemDescription
 from thsa_cosim.system.write import write_halved
 
 LARGE = 0.5
 """Change over noise from which on a result is said to depend on the communication step."""
+LARGE_SHARE = 0.01
+"""The same over the range of a signal that no sensor has measured, as in a check."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +41,19 @@ class CouplingError:
     noise: Mapping[str, float]
     units: Mapping[str, str]
     remedy: str = "lower the steps of the components"
+    ranges: Mapping[str, float] = field(default_factory=dict)
+    """Of the signals, in the same: what counts where there is no noise, as in a tuning."""
+
+    @property
+    def has_noise(self) -> bool:
+        """Whether there are sensors to compare with."""
+        return any(self.noise.get(n, 0.0) > 0.0 for n in self.changes)
 
     @property
     def worst(self) -> tuple[str, float]:
-        """The signal whose change is largest over its noise, and that ratio."""
-        ratios = {n: c / self.noise[n] for n, c in self.changes.items() if self.noise.get(n, 0.0) > 0.0}
+        """The signal whose change is largest over its noise (without any: its range), and that ratio."""
+        size = self.noise if self.has_noise else self.ranges
+        ratios = {n: c / size[n] for n, c in self.changes.items() if size.get(n, 0.0) > 0.0}
         name = max(ratios, key=ratios.__getitem__, default="")
         return name, ratios.get(name, 0.0)
 
@@ -52,22 +62,35 @@ class CouplingError:
         name, ratio = self.worst
         if not name:
             return (
-                f"halving the communication steps: no signal of {self.recording} has a noise to compare with"
+                f"halving the communication steps: no signal of {self.recording} has a noise or a range to compare"
+                " with"
             )
-        size = f"{self.changes[name]:.2g} {self.units[name]} rms, {ratio:.2g} times its noise"
+        over = f"{ratio:.2g} times its noise" if self.has_noise else f"{100.0 * ratio:.2g} % of its range"
+        size = f"{self.changes[name]:.2g} {self.units[name]} rms, {over}"
         return f"halving the communication steps changes {name} by {size} ({self.recording})"
 
     @property
     def reason(self) -> str:
         """Why values are not to be trusted, or ""."""
-        return f"{self.sentence()}; {self.remedy}" if self.worst[1] > LARGE else ""
+        limit = LARGE if self.has_noise else LARGE_SHARE
+        return f"{self.sentence()}; {self.remedy}" if self.worst[1] > limit else ""
+
+    @property
+    def note(self) -> str:
+        """The sentence for the notes of a result, with the remedy where one is due."""
+        return f"WARNING: {self.reason}" if self.reason else self.sentence()
 
     def to_dict(self) -> dict[str, object]:
         """JSON types."""
         return {
             "recording": self.recording,
             "halved": {
-                name: {"rms": change, "noise": self.noise.get(name), "unit": self.units[name]}
+                name: {
+                    "rms": change,
+                    "noise": self.noise.get(name),
+                    "range": self.ranges.get(name),
+                    "unit": self.units[name],
+                }
                 for name, change in self.changes.items()
             },
         }
@@ -80,55 +103,90 @@ def coupling_error(
     values: Mapping[str, float],
     simulated: Signals,
     noise: Mapping[str, float],
+    opening: OpenRunner | None = None,
 ) -> CouplingError | str:
     """Run ``experiment`` at ``values`` once more with half the steps, and compare with ``simulated``.
 
+    ``opening``: opens the processes, as of a study that keeps its runs; left out: one process here. What is wrapped
+    around an FMU does not depend on its steps: it is left out, and the FMU alone is run at both steps.
     Returns a sentence where that run fails, and "" where nothing depends on a communication step: in Model Exchange,
     with FMUs of this toolkit, and with those that take steps of one size or step by themselves.
     """
-    found = _halved(fmu, spec, experiment, values)
+    own = experiment.wrapper_names
+    plain = replace(
+        experiment,
+        reduce=None,
+        wrapper=None,
+        outputs=tuple(n for n in experiment.outputs if n in fmu.variables),
+        fixed={name: value for name, value in experiment.fixed.items() if name not in own},
+    )
+    values = {name: value for name, value in values.items() if name not in own}
+    found = _halved(fmu, spec, plain, values, opening or Executor(workers=1).open_runner, both=bool(own))
     if found is None:
         return ""
-    outcome, stride, remedy = found
-    if outcome.signals is None:
-        return f"with half the communication steps {experiment.name} fails: {outcome.reason}"
-    finer = outcome.signals
+    outcomes, stride, remedy = found
+    failed = next((o for o in outcomes if o.signals is None), None)
+    if failed is not None:
+        return f"with half the communication steps {experiment.name} fails: {failed.reason}"
+    runs = [o.signals for o in outcomes if o.signals is not None]
+    finer, simulated = runs[-1], runs[0] if own else simulated
     changes = {
         n: float(np.sqrt(np.mean((finer[n][::stride] - simulated[n]) ** 2)))
         for n in simulated.names
         if n in finer
     }
     name = experiment.name.partition("/")[2] or experiment.name
-    return CouplingError(name, changes, noise, {n: simulated.units[n] for n in changes}, remedy)
+    units = {n: simulated.units[n] for n in changes}
+    return CouplingError(name, changes, noise, units, remedy, {n: _range(simulated[n]) for n in changes})
+
+
+def _range(values: FloatArray) -> float:
+    """Largest less smallest of (n,); 0 where that is rounding."""
+    width = float(np.ptp(values))
+    return width if width > 1e-9 * float(np.max(np.abs(values), initial=0.0)) else 0.0
 
 
 def _halved(
-    fmu: FmuDescription, spec: SimulationTable, experiment: Experiment, values: Mapping[str, float]
-) -> tuple[Outcome, int, str] | None:
-    """Run with half the steps: outcome, rows of it per row of the experiment, remedy; None if nothing is stepped."""
-    plain = replace(experiment, reduce=None)
+    fmu: FmuDescription,
+    spec: SimulationTable,
+    plain: Experiment,
+    values: Mapping[str, float],
+    opening: OpenRunner,
+    both: bool,
+) -> tuple[list[Outcome], int, str] | None:
+    """Run with half the steps: outcome, rows of it per row of the experiment, remedy; None if nothing is stepped.
+
+    ``both``: with the whole steps before.
+    """
     if isinstance(fmu, SystemDescription):
         if not any(c.execution == "coupled" for c in fmu.system.components):
             return None
         with tempfile.TemporaryDirectory(prefix="thsa-cosim-halved-") as folder:
             halved = write_halved(fmu, Path(folder) / "halved.ssp")
-            outcome = _run(spec, [replace(plain, fmu=halved)], values)
-        return outcome, 1, "lower the steps of the components"
+            finer = replace(plain, name=f"{plain.name} at half the steps", fmu=halved)
+            outcomes = _run(spec, [plain, finer] if both else [finer], values, opening, both)
+        return outcomes, 1, "lower the steps of the components"
     steps = fmu.supports_co_simulation and fmu.capabilities.get(VARIABLE_STEP, False)
-    if not steps or is_ours(fmu) or experiment.wrapper is not None or spec.interface == "model-exchange":
+    if not steps or is_ours(fmu) or spec.interface == "model-exchange":
         return None
     if settle_handling(spec, [plain]).interface == "model-exchange":
         return None
     fine = replace(plain, name=f"{plain.name} at half the step", time=refined(plain.time, 2))
-    outcome = _run(spec, [plain, fine], values)
-    fine_run, within = outcome.signals, moves_within(fmu, plain.inputs)
+    outcomes = _run(spec, [plain, fine], values, opening, both)
+    fine_run, within = outcomes[-1].signals, moves_within(fmu, plain.inputs)
     if fine_run is not None and within and own_step(fine_run.time, fine_run.values) is not None:
         return None  # shorter steps than its own tell nothing
-    return outcome, 2, "lower simulation.step"
+    return outcomes, 2, "lower simulation.step"
 
 
-def _run(spec: SimulationTable, experiments: Sequence[Experiment], values: Mapping[str, float]) -> Outcome:
-    """Run the last of ``experiments`` here, wherever the study runs: the archive is a file of this machine."""
-    with Executor(workers=1).open_runner(spec, experiments) as runner:
-        (outcome,) = runner.run([Job(experiments[-1].name, dict(values), keep_signals=True)])
-    return outcome
+def _run(
+    spec: SimulationTable,
+    experiments: Sequence[Experiment],
+    values: Mapping[str, float],
+    opening: OpenRunner,
+    both: bool,
+) -> list[Outcome]:
+    """Run the last of ``experiments``, or ``both``."""
+    with opening(spec, experiments) as runner:
+        jobs = [Job(e.name, dict(values), keep_signals=True) for e in experiments]
+        return runner.run(jobs if both else jobs[-1:])

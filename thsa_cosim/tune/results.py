@@ -7,6 +7,7 @@ from pathlib import Path
 from thsa_cosim.scenario import TuneScenario
 from thsa_cosim.search import Generation
 from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.study import CouplingError
 from thsa_cosim.tune.population import Line
 from thsa_cosim.tune.schedule import GainSchedule
 
@@ -111,3 +112,5 @@ class TuneResult:
     failures: Mapping[str, int]
     notes: tuple[str, ...] = ()
     settings: Mapping[str, object] = field(default_factory=dict)
+    coupling: CouplingError | None = None
+    """What half the communication step changes with the tuned gains, of an FMU that depends on one."""

@@ -9,7 +9,7 @@ import numpy as np
 from thsa_cosim import __version__
 from thsa_cosim.batch import Journal
 from thsa_cosim.errors import StudyError
-from thsa_cosim.scenario import TuneScenario
+from thsa_cosim.scenario import OpenRunner, TuneScenario
 from thsa_cosim.scenario.tune_model import combinations
 from thsa_cosim.search import (
     EvolutionResult,
@@ -21,16 +21,19 @@ from thsa_cosim.search import (
 )
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.study import (
+    CouplingError,
     Engine,
     Place,
     Reply,
     Request,
     Study,
     Want,
+    coupling_error,
     describe,
     interleave,
     study_identity,
 )
+from thsa_cosim.system.description import SystemDescription
 from thsa_cosim.tune.combine import INFEASIBLE, equation_7
 from thsa_cosim.tune.evaluate import Evaluation, evaluate, evaluate_each
 from thsa_cosim.tune.pareto import front
@@ -86,6 +89,7 @@ def tune(scenario: TuneScenario, place: Place) -> TuneResult:
                 tuning.notes += runner.notes
                 engine = Engine(runner, journal, place.on_progress, "tuning")
                 tuning.run(engine, journal)
+            tuning.couple(study.open_runner)
             study.complete()
         except KeyboardInterrupt:
             tuning.interrupted = True
@@ -116,6 +120,7 @@ class _Tuning:
     schedule: ScheduleResult | None = None
     notes: list[str] = field(default_factory=list)
     engine: Engine | None = None
+    coupling: CouplingError | None = None
 
     def run(self, engine: Engine, journal: Journal) -> None:
         """Search all groups at once, then score, draw and schedule."""
@@ -131,6 +136,23 @@ class _Tuning:
             self.pareto = self._pareto(journal)
         if spec.schedule is not None:
             self.schedule = self._schedule(engine)
+
+    def couple(self, opening: OpenRunner) -> None:
+        """Find out what the communication step of a foreign FMU costs, with the tuned gains, in one condition."""
+        spec, gains = self.scenario, self._gains(0)
+        after = next(s for s in self.scored if s.name == "after")
+        pairs = zip(self.groups[0].cases, after.signals, strict=True)
+        case, simulated = next(((c, s) for c, s in pairs if s is not None), (None, None))
+        if case is None or simulated is None:
+            return
+        values = spec.parameters.assignments(gains)
+        coupled = coupling_error(spec.fmu, spec.simulation, case.experiment, values, simulated, {}, opening)
+        if isinstance(coupled, CouplingError):
+            is_system = isinstance(spec.fmu, SystemDescription)
+            coupled = coupled if is_system else replace(coupled, remedy="lower command.step")
+            self.coupling = coupled
+        if said := (coupled if isinstance(coupled, str) else coupled.note):
+            self.notes.append(said)
 
     # -- search ---------------------------------------------------------------------------------------
     def _search(self, engine: Engine) -> None:
@@ -350,6 +372,7 @@ class _Tuning:
             evaluations=0 if engine is None else engine.evaluations.total(),
             failures={} if engine is None else engine.failures,
             notes=tuple(self.notes),
+            coupling=self.coupling,
             settings={
                 **scenario.search.model_dump(),
                 "cost": {**scenario.cost.model_dump(exclude={"steady"}), "signed": scenario.cost.signed},

@@ -120,7 +120,9 @@ def test_plain_friction_is_offered_at_the_load_of_a_black_box_alone() -> None:
     """Models with source declare Coulomb and viscous friction at every place."""
     variants = known_effects()["plain-friction"].variants
     assert {v.slots for v in variants} == {("load",)}
-    assert [p.name for v in variants for p in v.parameters] == ["F_C", "b"]
+    assert [(p.name, v.beside) for v in variants for p in v.parameters] == [
+        ("F_C", False), ("b", False), ("b", True), ("F_C", True),
+    ]  # fmt: skip
     at = {"s": np.array([-1.0, 0.0, 1.0]), "v": np.array([-2.0, 0.0, 3.0])}
     law = laws(None)["plain-friction", "PlainFriction"]
     assert law({"F_C": 5.0, "b": 7.0}, at).tolist() == [-19.0, 0.0, 26.0]

@@ -73,14 +73,14 @@ def test_with_the_part_open_the_errors_are_those_of_the_fit_with_it(spread: floa
     known = whole.T @ whole / fit.inflation + prior
     expected = np.sqrt(np.diag(np.linalg.inv(known))) * [0.01, 1.0, 1.0]
     own = np.sqrt(np.diag(np.linalg.inv(known[:2, :2]))) * [0.01, 1.0]
-    assert parts[0].stderr == pytest.approx(expected[2], rel=0.02)
+    assert abs(parts[0].size) == pytest.approx(expected[2], rel=0.02)
     np.testing.assert_allclose(np.hypot(own, widening(parts, fit)), expected[:2], rtol=0.02)
 
 
 def test_a_note_says_what_the_parameter_would_be_and_that_it_is_to_be_measured_apart() -> None:
     fit = fitted(SPREAD)
     (part,) = hidden_parts(found(fit, "scales"))
-    assert part.moves["K_t"] == pytest.approx(K_T * part.stderr, rel=0.01)
+    assert part.moves["K_t"] == pytest.approx(K_T * part.size, rel=0.01)
     (note,) = notes_on_hidden([part], fit, np.array([7e-4, 1e-2]))
     assert note.startswith(
         "loss:screw: scales, what scales, acts on these recordings as a change of K_t does"

@@ -218,7 +218,7 @@ def _judge(
     decision, reason = "not refined", "promises no more than chance"
     if proposal.gain >= one.threshold:
         reason = "promises less than those that were refined"
-    if not_testable(proposal, one.threshold):
+    if _not_testable(proposal, one.threshold):
         decision, reason = "not testable", "too little excitation beside the declared parameters"
         if not proposal.is_testable:
             reason = "nothing in the fit recordings depends on it"
@@ -276,7 +276,7 @@ def _values(proposal: Proposal, scored: Scored | None) -> Mapping[str, Value]:
     }
 
 
-def not_testable(proposal: Proposal, threshold: float) -> bool:
+def _not_testable(proposal: Proposal, threshold: float) -> bool:
     """Whether even a coefficient ``HUGE`` times as large as usual would drown in chance."""
     typical = np.array([p.typical for p in proposal.candidate.coefficients])
     return bool(np.all(np.sqrt(threshold) * proposal.stderr > HUGE * np.abs(typical)))

@@ -12,28 +12,30 @@ import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.candidate import CandidateParameter
 from thsa_cosim.diagnosis.choosing.attribution import Attribution
-from thsa_cosim.diagnosis.choosing.findings import not_testable
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.signals import FloatArray
 
+#: Share of a part's response that the unknowns of the model cannot imitate, below which they stand for it.
+IMITATED = 1e-3
+
 
 @dataclass(frozen=True)
 class HiddenPart:
-    """A coefficient of ``effect`` that is not in the model, and how large it may be (``stderr``, in its unit).
+    """A coefficient of ``effect`` that is not in the model, and how large it may be (``size``, in its unit, signed).
 
-    ``moves``: what one standard error of it would do to the unknowns of the model, by name, in their units.
+    ``moves``: what a part of that size would do to the unknowns of the model, by name, in their units.
     """
 
     effect: str
     parameter: CandidateParameter
     description: str
-    stderr: float
+    size: float
     moves: Mapping[str, float]
 
 
 def hidden_parts(found: Attribution) -> tuple[HiddenPart, ...]:
-    """The parts of the accepted effects that the last screening of them could not test beside the other parameters."""
+    """The parts of the accepted effects that were not added and that the unknowns of the model imitate."""
     taken = {(s.candidate.variant.block, s.candidate.slot.name) for s in found.accepted}
     parts: dict[str, HiddenPart] = {}
     for one in found.rounds:
@@ -47,23 +49,27 @@ def hidden_parts(found: Attribution) -> tuple[HiddenPart, ...]:
             ):
                 continue
             parts.pop(own.key, None)  # a later screening, beside more effects, says more
-            if proposal.is_testable and not_testable(proposal, one.threshold):
+            if proposal.is_testable and proposal.remaining < IMITATED:
                 parts[own.key] = _hidden(proposal, found.final)
     return tuple(parts.values())
 
 
 def _hidden(proposal: Proposal, fit: Fit) -> HiddenPart:
-    """Its size by what the recordings, widened by what they leave, and the drawing of what imitates it say together."""
+    """Its size: what the recordings ask for and its standard error, in quadrature.
+
+    The recordings say less by what they leave; the drawing of what imitates the part says its own.
+    """
     (parameter,), unknowns = proposal.candidate.coefficients, fit.unknowns
     moves = {name: float(move[0]) for name, move in proposal.moves.items() if name in unknowns.names}
     spreads = dict(zip(unknowns.names, unknowns.precision, strict=True))
-    information = float(proposal.precision[0, 0]) / fit.inflation
+    information = recorded = float(proposal.precision[0, 0]) / fit.inflation
     information += sum((spreads[name] * move) ** 2 for name, move in moves.items())
     widest = (parameter.upper - parameter.lower) / np.sqrt(12.0)
-    stderr = min(float(1.0 / np.sqrt(information)), widest)
+    asked = float(proposal.amplitudes[0]) * recorded / information
+    size = float(np.copysign(min(np.hypot(asked, 1.0 / np.sqrt(information)), widest), asked))
     description = proposal.candidate.variant.parameters[0].description
-    by_stderr = {name: -move * stderr for name, move in moves.items()}
-    return HiddenPart(proposal.candidate.name, parameter, description, stderr, by_stderr)
+    by_size = {name: -move * size for name, move in moves.items()}
+    return HiddenPart(proposal.candidate.name, parameter, description, size, by_size)
 
 
 def widening(parts: Sequence[HiddenPart], fit: Fit) -> FloatArray:
@@ -88,11 +94,12 @@ def notes_on_hidden(parts: Sequence[HiddenPart], fit: Fit, stderr: FloatArray) -
         told = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
         unit = "" if part.parameter.unit == "1" else f" {part.parameter.unit}"
         unknown, value, move = surest
-        part_text = f"{part.parameter.name} = {part.stderr:.2g}{unit}"
+        apart = unknown.name if len(names) == 1 else "one of them"
+        part_text = f"{part.parameter.name} = {part.size:.2g}{unit}"
         notes.append(
             f"{part.effect}: {part.parameter.name}, {part.description}, acts on these recordings as a change of {told}"
             f" does; with {part_text}, {unknown.name} would be {value + move:.4g} in place of {value:.4g}"
-            f" {unknown.unit}, which its standard error covers. Measure {unknown.name} apart from the machine"
+            f" {unknown.unit}, which its standard error covers. Measure {apart} apart from the machine"
             " (a torque constant by the back-EMF), and give it that value with a small spread"
         )
     return tuple(notes)

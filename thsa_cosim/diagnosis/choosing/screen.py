@@ -165,7 +165,7 @@ class Orthogonal:
 
     def __init__(self, base: Fit) -> None:
         self._jacobian = np.asarray(base.jacobian, dtype=np.float32)
-        self._factor = cho_factor(base.information + 1e-9 * np.diag(np.diag(base.information)))
+        self._factor = _factor(base.information)
 
     def project(self, response: FloatArray) -> FloatArray:
         """(n, k) the unknowns' moves that imitate ``response`` (N, k) best."""
@@ -186,6 +186,21 @@ class Orthogonal:
             block = np.concatenate(left, axis=1)
             found += block.T @ block
         return found
+
+
+def _factor(information: FloatArray) -> tuple[FloatArray, bool]:
+    """Cholesky factor of an information matrix with a small ridge; larger where rounding leaves it indefinite.
+
+    An unknown on which nothing depends is its own direction.
+    """
+    size = np.diag(information)
+    ridge = np.diag(np.where(size > 0.0, size, 1.0))
+    for share in (1e-9, 1e-7, 1e-5):
+        try:
+            return cho_factor(information + share * ridge)
+        except np.linalg.LinAlgError:
+            continue
+    return cho_factor(np.diag(np.diag(ridge)))
 
 
 def _propose(

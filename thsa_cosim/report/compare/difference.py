@@ -335,7 +335,9 @@ def _notes(studies: Sequence[Study], rows: Sequence[Row]) -> Iterator[str]:
     if poor:
         yield (
             f"The {'model leaves' if len(poor) == 1 else 'models leave'} more than noise in {listing(poor)}: a small"
-            " difference may be the model's error. Compare two recordings of the same state to see how large that is."
+            " difference beside a large one may be the model's error, which changes with load and motion; recordings"
+            " of one state and motion do not show it. First mend the model: the loop as the drive has it, with the"
+            " filters and delays of its signals, then what a diagnosis finds."
         )
     unsure = [r.name for r in rows if _is_untested(r)]
     if unsure:

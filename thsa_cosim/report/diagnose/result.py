@@ -19,7 +19,7 @@ from thsa_cosim.diagnosis.results import (
     Value,
 )
 from thsa_cosim.identify import ForceBalance
-from thsa_cosim.inspection import judge_ratios
+from thsa_cosim.inspection import Trust, judge_ratios
 from thsa_cosim.report.diagnose.extended import write_extended_scenario
 from thsa_cosim.report.files import RESULT, write_csv, write_json
 from thsa_cosim.report.page.pictures import write_pictures
@@ -59,8 +59,9 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
         "equivalence": [{"names": list(c.names), "angle_deg": c.angle_deg} for c in result.equivalence],
         "experiment": None if result.experiment is None else _experiment(result.experiment),
         "data": result.data.to_dict(),
-        "trust": judge_ratios(_ratios(result.after if result.after["fit"] else result.before)).to_dict(),
+        "trust": _trust(result).to_dict(),
         "notes": list(result.notes),
+        **({} if result.coupling is None else {"coupling": result.coupling.to_dict()}),
         "seed": result.seed,
         "evaluations": result.evaluations,
         "failures": dict(result.failures),
@@ -68,6 +69,12 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
         "scenario": str(result.scenario),
         "version": result.version,
     }
+
+
+def _trust(result: DiagnosisResult) -> Trust:
+    """Whether what is left is noise, and does not depend on a communication step."""
+    left = judge_ratios(_ratios(result.after if result.after["fit"] else result.before))
+    return Trust.of((*left.reasons, result.coupling.reason if result.coupling is not None else ""))
 
 
 def _ratios(errors: Errors) -> dict[str, float]:

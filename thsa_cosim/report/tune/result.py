@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from thsa_cosim.inspection import Trust
 from thsa_cosim.scenario.metrics_schema import METRICS
 from thsa_cosim.tune import Pareto, ScheduleResult, Scored, Surface, TuneResult
 from thsa_cosim.tune.combine import equation_7
@@ -69,10 +70,11 @@ def tune_to_dict(result: TuneResult) -> dict[str, Any]:
             }
             for group in result.groups
         ],
-        # A tuning compares nothing with recordings; it believes its model.
+        # A tuning compares nothing with recordings; it believes its model, unless its communication step decides.
         "data": scenario.data.to_dict(),
-        "trust": {"verdict": "explained", "reasons": []},
+        "trust": Trust.of(() if result.coupling is None else (result.coupling.reason,)).to_dict(),
         "notes": list(result.notes),
+        **({} if result.coupling is None else {"coupling": result.coupling.to_dict()}),
     }
     plain: dict[str, Any] = _plain(content)
     return plain

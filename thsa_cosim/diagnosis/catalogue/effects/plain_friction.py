@@ -11,10 +11,15 @@ def friction(p: Values, at: Connectors) -> FloatArray:
     return np.asarray(p["F_C"] * at["s"] + p["b"] * at["v"])
 
 
-def _variant(parameter: EffectParameter) -> Variant:
+def _variant(parameter: EffectParameter, *, beside: bool) -> Variant:
     # Models with source declare these two at every place; at the load of a black box nobody does.
-    return Variant("FrictionEffect", "PlainFriction", (parameter,), slots=("load",), law=friction)
+    return Variant(
+        "FrictionEffect", "PlainFriction", (parameter,), slots=("load",), law=friction, beside=beside
+    )
 
+
+COULOMB = EffectParameter("F_C", "F", 0.02, "Coulomb friction", lower=0.0)
+VISCOUS = EffectParameter("b", "F/V", 0.02, "viscous coefficient", lower=0.0)
 
 EFFECT = Effect(
     name="plain-friction",
@@ -23,7 +28,9 @@ EFFECT = Effect(
     source="equation 5 of the article; Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083",
     signature="current with the sign of the motion, and in proportion to its speed, at every load",
     variants=(
-        _variant(EffectParameter("F_C", "F", 0.02, "Coulomb friction", lower=0.0)),
-        _variant(EffectParameter("b", "F/V", 0.02, "viscous coefficient", lower=0.0)),
+        _variant(COULOMB, beside=False),
+        _variant(VISCOUS, beside=False),
+        _variant(VISCOUS, beside=True),
+        _variant(COULOMB, beside=True),
     ),
 )

@@ -10,10 +10,11 @@ process (of a diagnosis: of the declared model; the superset takes longer). ``to
 last; ``search/FMU`` leaves out import, report, and what it takes to start a Python with NumPy for the worker. The
 first line is the floor: a Python that imports what any study needs, and one with NumPy alone. Of motor, screw and
 gearbox, `script_least_squares.py` then identifies the first ``--script-points`` temperatures from the same arrays;
-``script/ours`` compares CPU seconds per temperature, ours with everything included, and ``cost`` says by how much
-the script's final cost lies above ours. Of tunings with one set of gains, `script_tuning.py` searches until it has
-our final cost. EMPS needs DATA_EMPS.mat in ``../shared/emps``. A scenario without recordings, or whose command
-refuses it, is named with the reason.
+``script/ours`` compares CPU seconds per temperature, ours with everything included; ``cost`` says by how much the
+script's final cost lies above ours, and the last figure how far its values lie from ours at most, in our standard
+errors. Of tunings with one set of
+gains, `script_tuning.py` searches until it has our final cost. EMPS needs DATA_EMPS.mat in ``../shared/emps``. A
+scenario without recordings, or whose command refuses it, is named with the reason.
 """
 
 import argparse
@@ -259,6 +260,9 @@ def measure(name: str, output: Path, script_points: int, start_s: float) -> None
         print(f"{name:14s} failed: {said}", flush=True)
         return
     spent = json.loads(done.stdout.splitlines()[-1])
+    if not spent["runs"] and (folder / "result.json").exists():
+        print(f"{name:14s} left out: {folder} holds its result already; give another --output", flush=True)
+        return
     if not (folder / "result.json").exists():
         print(f"{name:14s} left out, exit code {spent['code']}: {said}", flush=True)
         return
@@ -324,9 +328,16 @@ def _beside(name: str, result: dict[str, Any], total: float, count: int, output:
     costs = {point["label"]: point for point in result["points"]}
     above = max(p["cost"] / costs[p["label"]]["cost"] - 1.0 for p in found["points"])
     runs = sum(p["runs"] for p in found["points"])
+    apart = max(
+        abs(value - own["value"]) / own["stderr"]
+        for p in found["points"]
+        for value, own in zip(p["values"], costs[p["label"]]["parameters"].values(), strict=True)
+        if own["stderr"]
+    )
     print(
         f"{'':12s} the script: {theirs:.1f} s CPU a temperature, {runs} runs; ours {ours:.2f} s;"
-        f"  script/ours {theirs / ours:.1f}, cost {above:+.1e} above ours"
+        f"  script/ours {theirs / ours:.1f}, cost {above:+.1e} above ours,"
+        f" values {apart:.1e} standard errors apart"
     )
 
 

@@ -48,6 +48,10 @@ def test_parquet_with_units_in_the_metadata(tmp_path):
         units=UNITS,
     )
     check(found)
+    # Times that are the same are held once, and so are numbers that nothing was done to.
+    assert found.samples["v"].time is found.samples["i_q"].time
+    assert found.samples["i_q"].written is found.samples["i_q"].values is found.signals["i_q"]
+    assert found.samples["v"].written is not found.samples["v"].values
     with pytest.raises(RecordingError, match="'note' is not numeric but string"):
         read_recording(
             tmp_path / "run.parquet", {"v": Column("note", "m/s")}, time=TimeAxis("time"), units=UNITS

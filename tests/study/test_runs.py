@@ -86,6 +86,8 @@ def test_what_is_read_is_what_was_written(tmp_path: Path) -> None:
     kept = {bytes([k]) * 16: outcome(k) for k in range(5)}
     kept[b"f" * 16] = outcome(status=Status.CRASH)
     kept[b"s" * 16] = replace(outcome(7), signals=None)
+    kept[b"l" * 16] = replace(outcome(8), reduced=np.random.default_rng(8).normal(size=(700, 3)))
+    kept[b"e" * 16] = replace(outcome(9), signals=None, reduced=np.zeros(0))
     with RunLog.open(tmp_path / RUNS) as log:
         for key, value in kept.items():
             log.append(key, value)

@@ -14,6 +14,8 @@ _HEAD = struct.Struct("<4sIQ")
 """Mark, checksum and length of what follows: an FMU may write into any descriptor of its process."""
 _MARK = b"THSA"
 _LONGEST = 2**33
+_LONG = 2**20
+"""Bytes from which on a message is written in two pieces."""
 
 
 class MalformedMessage(Exception):
@@ -99,9 +101,13 @@ def pack(message: Any) -> bytes:
 
 def write_frame(descriptor: int, message: Any) -> None:
     """Send one message; OSError if nobody reads any more."""
-    frame = memoryview(pack(message))
-    while frame:
-        frame = frame[os.write(descriptor, frame) :]
+    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    head = _HEAD.pack(_MARK, zlib.crc32(data), len(data))
+    # A long message is not copied once more for the sake of a single write.
+    for piece in (head, data) if len(data) > _LONG else (head + data,):
+        rest = memoryview(piece)
+        while rest:
+            rest = rest[os.write(descriptor, rest) :]
 
 
 def _length(head: bytes | bytearray | memoryview) -> tuple[int, int]:
@@ -111,7 +117,7 @@ def _length(head: bytes | bytearray | memoryview) -> tuple[int, int]:
     return checksum, length
 
 
-def _unpack(data: bytes, checksum: int) -> Any:
+def _unpack(data: bytes | memoryview, checksum: int) -> Any:
     if zlib.crc32(data) != checksum:
         raise MalformedMessage
     try:
@@ -150,6 +156,7 @@ class FrameReader:
             end = _HEAD.size + length
             if len(self._buffer) < end:
                 return
-            message = _unpack(bytes(memoryview(self._buffer)[_HEAD.size : end]), checksum)
+            with memoryview(self._buffer) as whole, whole[_HEAD.size : end] as own:
+                message = _unpack(own, checksum)
             del self._buffer[:end]
             yield message

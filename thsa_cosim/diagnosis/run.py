@@ -5,6 +5,7 @@ from functools import partial
 
 from threadpoolctl import threadpool_limits
 
+from thsa_cosim.batch.memory import give_back
 from thsa_cosim.diagnosis.blackbox.prepare import BlackBox, wrap_black_box
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect, declared_effects
 from thsa_cosim.diagnosis.catalogue.effect import Effect
@@ -69,6 +70,7 @@ def _diagnose(
 ) -> DiagnosisResult:
     """Everything after the folder was claimed."""
     say = study.place.say
+    give_back()  # what the inspection of the recordings took
     cases = [t.case for t in trials if t.part == "fit"]
     opening = partial(study.open_runner, scenario.simulation)
     tested: Superset | BlackBox
@@ -116,6 +118,7 @@ def _diagnose(
             machine=machine,
             say=say,
         )
+    give_back()  # what the search took
     if found is None:
         reason = next(iter(bench.failures), "no run succeeded")
         raise StudyError(f"{scenario.path}: the model with all effects cannot be simulated: {reason}")

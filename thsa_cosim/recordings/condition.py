@@ -83,13 +83,13 @@ def conditioned(
     mended = repaired(path, signal, time[kept], numbers[kept], missing[kept], source.repair, driven=driven)
     measured = numbers[kept]
     samples = Samples(
-        time[kept],
+        _shared(time[kept], grid),
         measured,
         target or source.unit or column.unit or "1",
         mended.left_out,
         source.interpolation == "hold",
         source.smooth == "mean",
-        column.values[kept],
+        _shared(column.values[kept], measured),
     )
     left_out: Mask | None = None
     if mended.left_out.any():
@@ -102,7 +102,7 @@ def conditioned(
         numbers, doubt = _piecewise_linear(time, numbers, kept, source.noise or noise)
         if doubt:
             notes.append(f"{path}: {signal} is used as measured, not piecewise linear: {doubt}.")
-    values = _resampled(signal, source, time, numbers, kept, grid)
+    values = _shared(_resampled(signal, source, time, numbers, kept, grid), samples.values)
     repairs = (*mended.done, *_turns(signal, column.values, source.unwrap))
     return Conditioned(values, noise, samples, left_out, tuple(notes), repairs)
 
@@ -131,6 +131,11 @@ def _resampled(
         return numbers[kept]
     held = frozenset((signal,)) if source.interpolation == "hold" else frozenset()
     return Signals(time, {signal: numbers}, held=held).resample(grid - source.shift)[signal]
+
+
+def _shared(values: FloatArray, other: FloatArray) -> FloatArray:
+    """``other`` if it is the same: a long recording has many equal columns, which are held once."""
+    return other if np.array_equal(values, other) else values
 
 
 def _turns(signal: str, written: FloatArray, period: float | None) -> tuple[str, ...]:

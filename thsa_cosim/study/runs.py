@@ -88,20 +88,23 @@ class RunLog(Closing):
         if key in self._at or (size > SMALL and self._end + size > self._allowed):
             return
         content = _encoded(outcome)
-        record = key + content
-        data = memoryview(_FRAME.pack(len(record), zlib.crc32(record)) + record)
-        begin = self._end
+        checksum, length = zlib.crc32(key), sum(len(piece) for piece in content)
+        for piece in content:
+            checksum = zlib.crc32(piece, checksum)
+        head, begin = _FRAME.pack(_KEY + length, checksum) + key, self._end
         try:
-            while data:
-                data = data[self._file.write(data) :]
+            for piece in (head, *content) if size > SMALL else (b"".join((head, *content)),):
+                data = memoryview(piece)
+                while data:
+                    data = data[self._file.write(data) :]
         except OSError as error:
             self._file.truncate(begin)
             raise MachineError(
                 f"The study folder {self.path.parent} cannot be written ({error.strerror}); repair that, or make room,"
                 " and give the same command again."
             ) from None
-        self._end = begin + _FRAME.size + len(record)
-        self._at[key] = (self._end - len(content), len(content))
+        self._end = begin + len(head) + length
+        self._at[key] = (self._end - length, length)
 
     def remove(self) -> None:
         """Remove the file: the study is complete."""
@@ -205,7 +208,8 @@ def _arrays(outcome: Outcome) -> list[np.ndarray]:
     return own if outcome.reduced is None else [*own, outcome.reduced]
 
 
-def _encoded(outcome: Outcome) -> bytes:
+def _encoded(outcome: Outcome) -> list[bytes | memoryview]:
+    """What is kept of an outcome, in pieces: its arrays are not copied."""
     signals, reduced = outcome.signals, outcome.reduced
     meta: dict[str, Any] = {
         "status": str(outcome.status),
@@ -218,8 +222,8 @@ def _encoded(outcome: Outcome) -> bytes:
         meta["signals"] = {"names": list(signals.names), "units": dict(signals.units)}
         meta["signals"] |= {"held": sorted(signals.held), "n": signals.time.size}
     head = json.dumps(meta).encode()
-    body = b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in _arrays(outcome))
-    return struct.pack("<I", len(head)) + head + body
+    body = [np.ascontiguousarray(a, dtype="<f8").reshape(-1) for a in _arrays(outcome)]
+    return [struct.pack("<I", len(head)) + head, *(a.view(np.uint8).data for a in body if a.size)]
 
 
 def _meta(content: bytes) -> tuple[dict[str, Any], int]:

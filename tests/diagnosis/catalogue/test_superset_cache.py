@@ -9,7 +9,7 @@ import pytest
 
 from thsa_cosim.diagnosis.catalogue import superset
 from thsa_cosim.diagnosis.catalogue.known import known_effects
-from thsa_cosim.diagnosis.catalogue.superset import build_superset
+from thsa_cosim.diagnosis.catalogue.superset import SizesReducer, build_superset
 from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import Signals
 
@@ -80,3 +80,12 @@ def test_an_edited_effect_acts_as_it_now_says(package: Path, tmp_path: Path) -> 
     (right,) = [line for line in text.splitlines() if line.strip().startswith("F =")]
     edit(package / WINDAGE, right, right.replace("then b_q", "then 2*b_q"))
     assert not np.allclose(speed(), before, rtol=1e-6, atol=0.0)
+
+
+def test_sizes_of_signals_in_closed_form() -> None:
+    time = np.linspace(0.0, 2.0, 2001)
+    signals = Signals(time, {"z": 3.0 * np.sin(2.0 * np.pi * time), "F": np.full(time.size, -2.0)})
+    largest, squares, count, travel = SizesReducer(("z", "F"))(signals).reshape(-1, 4).T
+    np.testing.assert_allclose(largest, [3.0, 2.0])
+    np.testing.assert_allclose(squares / count, [4.5 * 2000 / 2001, 4.0])
+    np.testing.assert_allclose(travel, [24.0, 0.0])

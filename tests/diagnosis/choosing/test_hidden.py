@@ -13,11 +13,18 @@ from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 
 N, SPREAD, K_T = 4000, 0.015, 0.3
-RNG = np.random.default_rng(3)
+SEED = 3
+RNG = np.random.default_rng(SEED)
 #: What a torque constant, per 0.01 of it, and a friction do to a current; a part of the friction that scales the load
 #: does what the torque constant does, but for one in a thousand.
 TORQUE, FRICTION, OTHER = RNG.standard_normal((3, N))
 PARTS = {"scales": -TORQUE / 0.01 * K_T + 1e-3 * OTHER, "differs": OTHER / 0.01}
+
+
+@pytest.fixture(autouse=True)
+def own_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each test draws the same numbers whatever runs before it."""
+    monkeypatch.setitem(globals(), "RNG", np.random.default_rng(SEED + 1))
 
 
 def candidate(name: str) -> Candidate:

@@ -24,7 +24,14 @@ from thsa_cosim.diagnosis.fitting.structure import (
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 
 N = 3000
-RNG = np.random.default_rng(2)
+SEED = 2
+RNG = np.random.default_rng(SEED)
+
+
+@pytest.fixture(autouse=True)
+def own_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each test draws the same numbers whatever runs before it."""
+    monkeypatch.setitem(globals(), "RNG", np.random.default_rng(SEED))
 
 
 def base() -> Fit:

@@ -19,7 +19,7 @@ from thsa_cosim.export import export_fmu
 from thsa_cosim.export.compile import native_platform
 from thsa_cosim.fmu import read_description
 from thsa_cosim.scenario import Opening, Scenario
-from thsa_cosim.signals import Signals
+from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.study import Case, export_digest, is_made_from, note_made_from
 
 
@@ -88,33 +88,49 @@ def scales_of(
     }
     known = read_description(fmu).variables
     outputs = tuple(dict.fromkeys(v for v in wanted.values() if v in known))
-    experiments = [_with_outputs(case, outputs) for case in cases]
+    experiments = [replace(_with_outputs(case, outputs), reduce=SizesReducer(outputs)) for case in cases]
     with open_(experiments) as runner:
         outcomes = runner.run([Job(e.name) for e in experiments])
-    runs = [o.signals for o in outcomes if o.status == Status.OK and o.signals is not None]
+    runs = [o.reduced.reshape(-1, 4) for o in outcomes if o.status == Status.OK and o.reduced is not None]
     if not runs:
         raise StudyError(
             f"{fmu.name}: no recording can be simulated with the declared parameters: {outcomes[0].reason}"
         )
+    found = np.array(runs)
+    sizes = {name: found[:, k] for k, name in enumerate(outputs)}
     scales: dict[str, dict[str, float]] = {}
     for slot in slots:
         own: dict[str, float] = {}
         for symbol, variable in SCALES[slot.interface].items():
             name = f"{slot.component}.{variable}"
             if name in outputs:
-                own[symbol] = _scale(symbol, [run[name] for run in runs])
+                largest, squares, count, travel = sizes[name].T
+                size = largest.max() if symbol in "VZ" else np.sqrt(squares.sum() / count.sum())
+                own[symbol] = float(size) or 1.0
                 if symbol == "Z":
-                    own["D"] = max(float(np.sum(np.abs(np.diff(run[name])))) for run in runs) or 1.0
+                    own["D"] = float(travel.max()) or 1.0
         angular = slot.units.get("z", "rad") == "rad"
         own["W"] = 1.0 if angular else 2.0 * np.pi / own.get("Z", 1.0)
         scales[slot.name] = own
     return scales
 
 
-def _scale(symbol: str, values: Sequence[np.ndarray]) -> float:
-    joined = np.concatenate(values)
-    size = np.max(np.abs(joined)) if symbol in "VZ" else np.sqrt(np.mean(joined**2))
-    return float(size) or 1.0
+@dataclass(frozen=True)
+class SizesReducer:
+    """Signals → largest magnitude, sum of squares, number of samples and distance travelled of each (4 k,).
+
+    In the worker: all signals of all slots over a long recording take hundreds of megabytes.
+    """
+
+    names: tuple[str, ...]
+
+    def __call__(self, simulated: Signals) -> FloatArray:
+        """Return the sizes of the named signals, in their units, one signal after the other."""
+        found = [
+            (np.max(np.abs(x)), x @ x, x.size, np.sum(np.abs(np.diff(x))))
+            for x in (simulated[name] for name in self.names)
+        ]
+        return np.array(found, dtype=np.float64).ravel()
 
 
 def _with_outputs(case: Case, outputs: tuple[str, ...]) -> Experiment:

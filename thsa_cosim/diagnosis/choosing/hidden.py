@@ -94,11 +94,12 @@ def notes_on_hidden(parts: Sequence[HiddenPart], fit: Fit, stderr: FloatArray) -
         told = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
         unit = "" if part.parameter.unit == "1" else f" {part.parameter.unit}"
         unknown, value, move = surest
+        apart = unknown.name if len(names) == 1 else "one of them"
         part_text = f"{part.parameter.name} = {part.size:.2g}{unit}"
         notes.append(
             f"{part.effect}: {part.parameter.name}, {part.description}, acts on these recordings as a change of {told}"
             f" does; with {part_text}, {unknown.name} would be {value + move:.4g} in place of {value:.4g}"
-            f" {unknown.unit}, which its standard error covers. Measure {unknown.name} apart from the machine"
+            f" {unknown.unit}, which its standard error covers. Measure {apart} apart from the machine"
             " (a torque constant by the back-EMF), and give it that value with a small spread"
         )
     return tuple(notes)

@@ -5,10 +5,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from thsa_cosim.batch import Experiment, Wrapper
-from thsa_cosim.costs.channels import ResidualReducer
+from thsa_cosim.costs.channels import Channel, ResidualReducer
 from thsa_cosim.errors import ScenarioError
 from thsa_cosim.scenario import DiagnoseSpec, Scenario
+from thsa_cosim.signals import FloatArray
 from thsa_cosim.study import Case, build_case
 
 Part = Literal["fit", "validate"]
@@ -80,9 +83,24 @@ def by_means(trials: Sequence[Trial], rows: int) -> tuple[Trial, ...]:
     of = -(-samples // rows)
     if of < 2:
         return tuple(trials)
-    return tuple(
-        replace(t, case=replace(t.case, channels=tuple(c.means(of) for c in t.case.channels))) for t in trials
-    )
+    return tuple(replace(t, case=replace(t.case, channels=_means(t.case.channels, of))) for t in trials)
+
+
+def _means(channels: Sequence[Channel], of: int) -> tuple[Channel, ...]:
+    """The channels by means; those that were sampled together share their times."""
+    found: list[Channel] = []
+    for channel in channels:
+        own = channel.means(of)
+        for other in found:
+            if np.array_equal(own.time, other.time) and _same(own.fine, other.fine):
+                own = replace(own, time=other.time, fine=other.fine)
+                break
+        found.append(own)
+    return tuple(found)
+
+
+def _same(times: FloatArray | None, others: FloatArray | None) -> bool:
+    return times is not None and others is not None and np.array_equal(times, others)
 
 
 def note_on_means(trials: Sequence[Trial]) -> list[str]:

@@ -1,15 +1,18 @@
 """Model Exchange: closed forms, every kind of event, no dependence on the output times."""
 
+import ctypes
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from fmpy.logging import addLoggerProxy
 from fmu_sources import build
 
 from fmu.test_plant import lag
 from thsa_cosim.fmu import Plant, SimulationFailure, Status
+from thsa_cosim.fmu.fmi2 import Callbacks, shared_callbacks
 from thsa_cosim.fmu.fmi3 import Fmi3Instance
 from thsa_cosim.signals import Signals
 
@@ -150,6 +153,21 @@ def test_failures_of_the_right_hand_side(fault: str, status: Status) -> None:
         with pytest.raises(SimulationFailure) as caught:
             plant.run({"fault": build.FAULTS[fault]}, inputs, ["y"], time)
         assert caught.value.status is status
+
+
+def test_messages_are_heard_after_another_importer_took_the_logger() -> None:
+    shared_callbacks()  # as instances before have done
+    heard: list[bytes] = []
+    logger = type(Callbacks().logger)(lambda *given: heard.append(given[-1]))
+    other = Callbacks(logger, None, None, None, None)
+    addLoggerProxy(ctypes.byref(other))
+    inputs, failing = Signals(RAMP, {"u": RAMP}, {}), {"fault": build.FAULTS["error"]}
+    with (
+        Plant.open(build.lag2(), kind="model-exchange") as plant,
+        pytest.raises(SimulationFailure, match="solver failed with 42 in lag"),
+    ):
+        plant.run(failing, inputs, ["y"], RAMP)
+    assert not heard
 
 
 def test_error_follows_the_tolerance() -> None:

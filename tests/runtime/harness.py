@@ -28,6 +28,7 @@ COMMON = (
     "snapshot.c",
     "solver.c",
     "advance.c",
+    "explain.c",
     "trajectory.c",
     "discrete.c",
     "newton.c",

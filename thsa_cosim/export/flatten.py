@@ -180,7 +180,8 @@ def _not_found(library: Library, search: list[Path], names: list[str]) -> str:
                 hint = did_you_mean(parts[depth], library.children(around))
                 return f"{around.file}: {'.'.join(parts[:depth])} holds no class {parts[depth]!r}.{hint}"
     model = names[-1]
-    known = [n for top in library.names() for n in _known(library, top)]
+    own = Library(search)  # without the shipped package, which nobody asked for
+    known = [n for top in own.names() for n in _known(own, top)]
     hint = did_you_mean(names[0], known)
     if "." in model and not hint:
         hint = " Add the folder of its library with --library, or to MODELICAPATH."

@@ -182,21 +182,31 @@ def listen(messages: Messages) -> None:
     _listener[0] = messages
 
 
-@cache
 def shared_callbacks() -> Callbacks:
     """Callbacks of every instance; they live as long as the process, as late messages may come."""
+    callbacks, logger, helper = _callbacks()
+    callbacks.logger = logger
+    if helper is not None:
+        # Its last caller hears every message: another importer here may have been, with a logger that is gone by now.
+        helper.addLoggerProxy(ctypes.addressof(callbacks))
+    return callbacks
+
+
+@cache
+def _callbacks() -> tuple[Callbacks, Any, Any]:
+    """The callbacks, the logger in Python, and fmpy's C helper, which formats before a logger is called, or None."""
     libc = ctypes.CDLL("msvcrt") if hasattr(ctypes, "WinDLL") else ctypes.CDLL(None)
     # The C library's own functions: no Python runs in an FMU's allocations.
     allocate, free = (ctypes.cast(f, ctypes.c_void_p).value for f in (libc.calloc, libc.free))
-    callbacks = Callbacks(_Logger(_log), allocate, free, None, None)
-    # Python cannot read printf arguments; fmpy's C helper formats before our logger is called. It is loaded
-    # without importing fmpy, which would cost every worker a tenth of a second.
+    logger, helper = _Logger(_log), None
+    # Python cannot read printf arguments. The helper is loaded without importing fmpy, which would cost every worker a
+    # tenth of a second.
     package = importlib.util.find_spec("fmpy")
     folder = {"linux": "linux64", "darwin": "darwin64", "win32": "win64"}.get(sys.platform, "")
     suffix = {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
     if package is not None and package.origin is not None:
         with contextlib.suppress(OSError, AttributeError):  # no helper here: messages keep their %s
-            helper = ctypes.CDLL(str(Path(package.origin).parent / "logging" / folder / f"logging{suffix}"))
-            helper.addLoggerProxy.argtypes, helper.addLoggerProxy.restype = [ctypes.c_void_p], None
-            helper.addLoggerProxy(ctypes.addressof(callbacks))
-    return callbacks
+            library = ctypes.CDLL(str(Path(package.origin).parent / "logging" / folder / f"logging{suffix}"))
+            library.addLoggerProxy.argtypes, library.addLoggerProxy.restype = [ctypes.c_void_p], None
+            helper = library
+    return Callbacks(logger, allocate, free, None, None), logger, helper

@@ -60,7 +60,7 @@ Status explain_failure(Instance *c, Status status, const char *why, Group group,
     if (reason)
         snprintf(text, sizeof text, ": %s", reason);
     else if (k < n)
-        snprintf(text, sizeof text, ": %s is not a finite number", name_of(group, k, name, sizeof name - 60));
+        snprintf(text, sizeof text, ": %.400s is not a finite number", name_of(group, k, name, sizeof name));
     instance_log(c, status, category, "%s at time %.15g%s", why, c->s.now.time, text);
     return status;
 }

@@ -265,4 +265,6 @@ def test_command_names_what_the_black_box_lacks(tmp_path: Path) -> None:
     assert result["model"] is None
     assert result["wrapper"] == "wrapper.json"
     with WrappedPlant.open(tmp_path / "study" / "wrapper.json") as plant:
-        assert list(plant.wrapper.parameters) == ["wrapper.motor.windage.b_q"]
+        assert list(plant.wrapper.parameters) == [
+            f"wrapper.motor.windage.{name}" for name in ("b_q", "n", "v_r")
+        ]

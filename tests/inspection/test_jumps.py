@@ -57,6 +57,23 @@ def test_a_command_that_is_there_from_the_first_sample_is_answered_there(first: 
     assert (("i", "step") in told(own)) == (first == 0.0)  # without a command something else switched it
 
 
+@pytest.mark.parametrize("count", [3, 12, 20, 50, 100, 101, 150])
+def test_short_recordings_are_inspected(count: int) -> None:
+    """Also with a slip of the unit, a speed without its sign and a position that sticks, which look at stretches."""
+    step = TIME.size // count
+    own = {name: (values[::step][:count], unit) for name, (values, unit) in signals().items()}
+    for name, values in (
+        ("w", own["w"][0] * 30.0 / np.pi),
+        ("w", np.abs(own["w"][0])),
+        ("phi", np.where(np.arange(count) < count // 2, own["phi"][0], own["phi"][0][count // 2])),
+    ):
+        found({**own, name: (values, own[name][1])}, TIME[::step][:count])
+    if count >= 100:
+        assert ("w", "unit") in told(
+            {**own, "w": (own["w"][0] * 30.0 / np.pi, "rad/s")}, TIME[::step][:count]
+        )
+
+
 def test_an_angle_that_wraps_is_named_with_its_period() -> None:
     (finding,) = found(changed("phi", np.mod(signals()["phi"][0], 2.0 * np.pi)))
     assert (finding.channel, finding.kind) == ("phi", "wrapped")

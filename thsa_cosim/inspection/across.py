@@ -172,7 +172,8 @@ def _ratio(a: FloatArray, b: FloatArray) -> float | None:
     """Median of b / a where a is large and both are settled."""
     settled = np.abs(a) > 0.3 * float(np.max(np.abs(a)))
     changes = np.abs(np.gradient(a)) <= 1e-9 * float(np.max(np.abs(a)))
-    calm = settled & np.asarray(np.convolve(changes, np.ones(101), "same") > 100.5)
+    # "same" would be as long as the window where that is longer than the recording.
+    calm = settled & np.asarray(np.convolve(changes, np.ones(101))[50:-50] > 100.5)
     used = calm if np.sum(calm) > 50 else settled
     ratios = b[used] / a[used]
     if ratios.size < 20:

@@ -159,7 +159,7 @@ def _moved(position: Channel, speed: Channel, factor: float) -> Iterator[Finding
         return
     still = _still(position, travelled)
     if still is not None:
-        reach = np.convolve(still, np.ones(2 * width + 1), "same") > 0.5
+        reach = np.convolve(still, np.ones(2 * width + 1))[width:-width] > 0.5
         free = ~(reach[width:] | reach[:-width])
         if _correlation(a[free], b[free]) > _ALIKE:
             yield _stuck(position, still, speed)

@@ -1,5 +1,6 @@
 """From an attribution to the result: the extended model, identified as the declared one was, and the verdict."""
 
+import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -239,10 +240,13 @@ class Conclusion:
             yield _untested(self.found, self.effects)
         yield from off_the_drawing(extended.identified.fit)
         if extended.model is not None and extended.fmu is not None:
-            yield (
-                f"{extended.fmu.name} is for {native_platform().fmi3} only; thsa-cosim export {extended.model}"
-                f" --package {self.spec.package} -o {extended.fmu} compiles it for all platforms"
-            )
+            again = export_command(extended.model, self.spec.package, extended.fmu)
+            yield f"{extended.fmu.name} is for {native_platform().fmi3} only; {again} compiles it for all platforms"
+
+
+def export_command(model: object, package: object, fmu: object) -> str:
+    """The command that exports ``model`` to ``fmu``, as a shell takes it, whatever is in its paths."""
+    return shlex.join(map(str, ("thsa-cosim", "export", model, "--package", package, "-o", fmu)))
 
 
 def _built(

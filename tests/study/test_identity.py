@@ -21,7 +21,7 @@ from thsa_cosim.scenario.schema import StagesTable
 from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.ssv import ParameterSet, write_ssv
 from thsa_cosim.study import digest_of_recording, identity, shown_words, stages_identity, study_identity
-from thsa_cosim.study.digest import digest_of_folder
+from thsa_cosim.study.digest import digest_of_file, digest_of_folder
 from thsa_cosim.study.folder import changed
 from thsa_cosim.study.identity import BY_CONTENT, SHOWN_ONLY, _plain, flatten
 
@@ -271,6 +271,32 @@ def test_a_tuning_counts_its_start_values_and_how_sure_they_are(folder: Path, id
     assert changed(before, study_identity(loaded(folder, tuning()))) == ["start values.motor.gain"]
     sure = study_identity(loaded(folder, {k: v for k, v in tuning().items() if k != "uncertainty"}))
     assert not [key for key in sure if key.startswith("uncertainty")]
+
+
+def test_a_tuning_counts_what_is_in_its_profiles_and_not_where_they_are(folder: Path) -> None:
+    data = {
+        **{k: v for k, v in tuning().items() if k not in ("uncertainty",)},
+        "command": {"input": "w_cmd", "output": "w_m", "unit": "rad/s", "shape": "recorded"},
+        "profile": {
+            "recordings": ["runs/warm.csv"],
+            "time": {"column": "time", "unit": "s"},
+            "columns": {"w_cmd": {"column": "command", "unit": "rad/s"}},
+        },
+        "metrics": {"window": [0.3, 0.4]},
+    }
+    before = study_identity(loaded(folder, data))
+    (folder / "runs" / "warm.csv").rename(folder / "warm.csv")
+    data["profile"]["recordings"] = ["warm.csv"]
+    assert study_identity(loaded(folder, data)) == before
+    edit(folder / "warm.csv", ",10,", ",9,")
+    assert changed(before, study_identity(loaded(folder, data))) == ["profile.recordings[warm]"]
+
+
+def test_a_file_is_known_by_its_content(tmp_path: Path) -> None:
+    file = tmp_path / "curve.txt"
+    file.write_bytes(b"abc")
+    # FIPS 180-2, appendix B.1
+    assert digest_of_file(file) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
 
 
 def test_a_scenario_is_asked_key_by_key(folder: Path) -> None:

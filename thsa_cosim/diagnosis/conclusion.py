@@ -1,5 +1,6 @@
 """From an attribution to the result: the extended model, identified as the declared one was, and the verdict."""
 
+import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -241,10 +242,13 @@ class Conclusion:
         yield from off_the_drawing(extended.identified.fit)
         yield from doubts(s.candidate.effect for s in self.found.accepted)
         if extended.model is not None and extended.fmu is not None:
-            yield (
-                f"{extended.fmu.name} is for {native_platform().fmi3} only; thsa-cosim export {extended.model}"
-                f" --package {self.spec.package} -o {extended.fmu} compiles it for all platforms"
-            )
+            again = export_command(extended.model, self.spec.package, extended.fmu)
+            yield f"{extended.fmu.name} is for {native_platform().fmi3} only; {again} compiles it for all platforms"
+
+
+def export_command(model: object, package: object, fmu: object) -> str:
+    """The command that exports ``model`` to ``fmu``, as a shell takes it, whatever is in its paths."""
+    return shlex.join(map(str, ("thsa-cosim", "export", model, "--package", package, "-o", fmu)))
 
 
 def doubts(effects: Iterable[Effect]) -> Iterator[str]:

@@ -255,6 +255,23 @@ CLOSED: dict[str, Callable[[np.ndarray], dict[str, np.ndarray]]] = {
     "finalStart": lambda t: {"x": 2 * e(-t)},
     "sampleOffset": lambda t: {"x": sum(np.maximum(0, t - (0.15 + 0.2 * k)) for k in range(5))},
     "twoSamples": lambda t: {"a": sum(2 * k * np.maximum(0, t - 0.2 * k) for k in range(1, 6))},
+    "initTwoUnfixed": lambda t: {"x": 2 * e(-3 * t), "y": 3 * e(-2 * t)},
+    "evElsewhenOrder": lambda t: {"x": np.interp(t, [0, 0.2, 0.4, 1], [0, 0, 0.2, 0.2 + 11 * 0.6])},
+    "evReinitTwo": lambda t: {"s": np.where(t < 0.3, t, 0.3 + 10.3 * (t - 0.3))},
+    "evStateMachine": lambda t: {"x": np.interp(t, [0, 0.5, 0.7, 1], [0, 0.5, 0.1, 0.1])},
+    "evPreChain": lambda t: {
+        "x": np.interp(t, [0, 0.1, 0.3, 0.5, 0.7, 0.9, 1], np.cumsum([0, 0.1, 0.4, 0.6, 1, 1.6, 1.3]))
+    },
+    "evCascade": lambda t: {"x": np.maximum(0, t - 0.3)},
+    "evFloorDiv": lambda t: {
+        "x": np.interp(
+            t,
+            [0, 0.1, 0.25, 0.3, 0.5, 0.7, 0.75, 0.9, 1],
+            np.cumsum([0, -2.2, -1.8, -0.55, -0.2, 0, 0.5, 1.65, 2.1]),
+        ),
+        "y": 0.8 * np.minimum(t, 0.5),
+    },
+    "arEachFinal": lambda t: {"a[2].x": e(-5 * t), "b[1].x": e(-3 * t), "b[2].x": e(-7 * t)},
 }
 START: dict[str, float] = {
     "initParamExprStart.a": 3.0,

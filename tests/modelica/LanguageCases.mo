@@ -3047,6 +3047,130 @@ package LanguageCases "One case of the language each, with a closed form: what a
     end M;
   end TwoSamples;
 
+  package InitTwoUnfixed
+    model M
+      parameter Real a(fixed=false,start=1);
+      parameter Real b(fixed=false,start=1);
+      Real x;
+      Real y(start=3,fixed=true);
+    initial equation
+      x=2;
+      a+b=5;
+      a-b=1;
+    equation
+      der(x)=-a*x;
+      der(y)=-b*y;
+    end M;
+  end InitTwoUnfixed;
+
+  package EvElsewhenOrder
+    model M
+      Integer n(start=0,fixed=true);
+      Real x(start=0,fixed=true);
+    equation
+      when time>0.2 then
+        n=1;
+      elsewhen {time>0.4,time>0.2} then
+        n=pre(n)+10;
+      end when;
+      der(x)=n;
+    end M;
+  end EvElsewhenOrder;
+
+  package EvReinitTwo
+    model M
+      Real x(start=0,fixed=true);
+      Real v(start=1,fixed=true);
+      Real s(start=0,fixed=true);
+    equation
+      der(x)=1;
+      der(v)=0;
+      der(s)=v;
+      when time>0.3 then
+        reinit(x,5);
+        reinit(v,pre(x)+10);
+      end when;
+    end M;
+  end EvReinitTwo;
+
+  package EvStateMachine
+    model M
+      Integer s(start=1,fixed=true);
+      Real x(start=0,fixed=true);
+    equation
+      der(x)=if s==1 then 1 elseif s==2 then -2 else 0;
+    algorithm
+      when pre(s)==1 and x>0.5 then
+        s:=2;
+      elsewhen pre(s)==2 and x<0.1 then
+        s:=3;
+      end when;
+    end M;
+  end EvStateMachine;
+
+  package EvPreChain
+    model M
+      Real a(start=1,fixed=true);
+      Real b(start=1,fixed=true);
+      Real x(start=0,fixed=true);
+    equation
+      when sample(0.1,0.2) then
+        a=pre(b)+pre(a);
+        b=pre(a);
+      end when;
+      der(x)=a;
+    end M;
+  end EvPreChain;
+
+  package EvCascade
+    model M
+      Boolean a(start=false,fixed=true);
+      Boolean b(start=false,fixed=true);
+      Integer n(start=0,fixed=true);
+      Real x(start=0,fixed=true);
+    equation
+      when time>0.3 then
+        a=true;
+      end when;
+      when a then
+        b=true;
+      end when;
+      when b and not pre(b) then
+        n=pre(n)+1;
+      end when;
+      der(x)=n;
+    end M;
+  end EvCascade;
+
+  package EvFloorDiv
+    model M
+      Real u;
+      Real x(start=0,fixed=true);
+      Real y(start=0,fixed=true);
+    equation
+      u=4*time-2;
+      der(x)=floor(u)+10*div(u,0.8);
+      der(y)=mod(u,0.8)-rem(u,0.8);
+    end M;
+  end EvFloorDiv;
+
+  package ArEachFinal
+    model A
+      parameter Real k[2]={1,1};
+      final parameter Real q=sum(k);
+      Real x(start=1,fixed=true);
+    protected
+      Real h;
+    equation
+      h=q*x;
+      der(x)=-h;
+    end A;
+    model M
+      A a[2](each k={2,3});
+      A b[2](k=[1,2;3,4]);
+    end M;
+  end ArEachFinal;
+
   model All "one of each, so that one FMU tests them"
     InitAlgLoop.M initAlgLoop;
     InitParamExprStart.M initParamExprStart;
@@ -3239,6 +3363,14 @@ package LanguageCases "One case of the language each, with a closed form: what a
     FinalStart.M finalStart;
     SampleOffset.M sampleOffset;
     TwoSamples.M twoSamples;
+    InitTwoUnfixed.M initTwoUnfixed;
+    EvElsewhenOrder.M evElsewhenOrder;
+    EvReinitTwo.M evReinitTwo;
+    EvStateMachine.M evStateMachine;
+    EvPreChain.M evPreChain;
+    EvCascade.M evCascade;
+    EvFloorDiv.M evFloorDiv;
+    ArEachFinal.M arEachFinal;
     annotation(experiment(StopTime=1, Tolerance=1e-8));
   end All;
 end LanguageCases;

@@ -48,7 +48,7 @@ def judge_step(
         if fixed:
             text = f"it takes steps of {step:g} s only, as it declares: what they cost in accuracy cannot be tried"
             return Verdict.NOT_TRIED, text, {}
-        refused = outcome.status in (Status.FMI_ERROR, Status.FMI_DISCARD)
+        refused = outcome.status in (Status.FMI_ERROR, Status.FMI_DISCARD, Status.INCOMPLETE)
         if refused and "t = 0 s" in outcome.reason:
             text = f"it declares steps of any size, and refuses half of {step:g} s: {outcome.reason}"
             return Verdict.WARNING, text, {}

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from fmu_sources.build import HABITS2, events2, habits2, library, write_fmu
 
-from thsa_cosim.batch import Experiment, Job, LocalRunner
-from thsa_cosim.check import Finding, Verdict, bench, budget, check_fmu
+from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
+from thsa_cosim.check import Finding, Verdict, bench, budget, check_fmu, numerics
 from thsa_cosim.cli import run_command
 from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu import read_description
@@ -174,3 +174,23 @@ def test_runs_that_hang_do_not_take_longer_than_a_line_may(monkeypatch: pytest.M
     assert len(list(watch.while_affordable(60))) <= 2 * budget.SECONDS / 10.0 + budget.LEAST
     monkeypatch.setattr(budget.time, "monotonic", lambda: 0.0)
     assert list(budget.Watch().while_affordable(60)) == list(range(60))
+
+
+def test_changes_that_fall_with_the_step_are_told_from_those_that_do_not() -> None:
+    """Runs whose error is proportional to their step, and runs that differ at random."""
+
+    def runs(error: list[float]) -> list[tuple[float, Outcome]]:
+        found = []
+        for k, e in enumerate(error):
+            time = np.linspace(0.0, 1.0, 10 * 2**k + 1)
+            found.append((0.1 / 2**k, Outcome(Status.OK, signals=Signals(time, {"y": time * (1.0 + e)}))))
+        return found
+
+    judged = (Verdict.FAILED, "halving 0.2 s changes y by 4.0e-01 of its range", {"change": 0.4})
+    converging = numerics.judge_shorter_steps(judged, runs([0.4, 0.2, 0.1, 0.05]))
+    assert "it falls with the step, but halving 0.05 s still changes" in converging[1].replace(
+        "0.025", "0.05"
+    )
+    random = numerics.judge_shorter_steps(judged, runs([0.0, 0.5, 0.0, 0.5]))
+    assert "shorter steps change as much: no step is known to be right" in random[1]
+    assert converging[0] is random[0] is Verdict.FAILED

@@ -188,9 +188,7 @@ def test_changes_that_fall_with_the_step_are_told_from_those_that_do_not() -> No
 
     judged = (Verdict.FAILED, "halving 0.2 s changes y by 4.0e-01 of its range", {"change": 0.4})
     converging = numerics.judge_shorter_steps(judged, runs([0.4, 0.2, 0.1, 0.05]))
-    assert "it falls with the step, but halving 0.05 s still changes" in converging[1].replace(
-        "0.025", "0.05"
-    )
+    assert "it falls with the step, but halving 0.025 s still changes" in converging[1]
     random = numerics.judge_shorter_steps(judged, runs([0.0, 0.5, 0.0, 0.5]))
     assert "shorter steps change as much: no step is known to be right" in random[1]
     assert converging[0] is random[0] is Verdict.FAILED

@@ -102,7 +102,7 @@ def found() -> Any:
     refined = [scored(winner), scored(rival), scored(worse)]
     own = one_round(
         [winner, rival, worse, proposal("a", 50.0, start=1.0), less, chance, blind, deaf],
-        refined, refined[0], ("",), (refined[1],),
+        refined, refined[0], ("",), (scored(rival, 95.0),),
     )  # fmt: skip
     return attribution(own, accepted=(refined[0],))
 
@@ -123,7 +123,7 @@ def test_every_candidate_is_judged_once_the_accepted_one_first_then_what_was_ref
         "nothing in the fit recordings depends on it",
     ]
     assert {j.round for j in made} == {1}
-    assert [j.held_out_gain for j in made] == [90.0, 90.0, 90.0, None, None, None, None]
+    assert [j.held_out_gain for j in made] == [90.0, 95.0, 90.0, None, None, None, None]
     assert made[0].variant == "a:motor/x0 (v_S = 0)"
 
 

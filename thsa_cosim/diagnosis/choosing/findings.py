@@ -191,7 +191,8 @@ def judged(found: Attribution) -> tuple[Judged, ...]:
     for number, one in enumerate(found.rounds, start=1):
         kept = one.accepted is not None and one.accepted in found.accepted
         rivals = {r.candidate.key for r in one.rivals} if kept else set()
-        refined = {id(s.proposal): s for s in one.scored}
+        # Of a rival the fit that makes it one, with all parameters.
+        refined = {id(s.proposal): s for s in (*one.scored, *one.rivals)}
         seen: set[str] = set()
         winner = None if one.accepted is None else one.accepted.proposal
         ordered = sorted(one.proposals, key=lambda p: (p is not winner, id(p) not in refined, -p.gain))

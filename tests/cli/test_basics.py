@@ -77,12 +77,25 @@ def test_help_imports_nothing_heavy() -> None:
     assert done.returncode == 0, done.stderr
 
 
+def test_the_command_alone_shows_its_help() -> None:
+    done = run()
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("Usage: thsa-cosim")
+    assert "\n  identify " in done.stdout, "one command a line"
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["identfy", "x.toml"], "Did you mean 'identify'?"),
         (["frobnicate"], "Known commands: export, check, init, simulate, identify"),
-        (["identify"], "Missing argument 'SCENARIO'"),
+        (["identify"], "Missing argument 'SCENARIO'. Usage: thsa-cosim identify [OPTIONS] SCENARIO."),
+        (["identify", ROOT / "scenarios"], "is a folder; name a scenario file (.toml), such as "),
+        (
+            ["identify", ROOT / "fmus" / "Motor.fmu"],
+            "is a model, no scenario file (.toml); 'thsa-cosim init ",
+        ),
+        (["tune", ROOT / "scenarios" / "recordings" / "motor_m30.parquet"], "'thsa-cosim init MODEL.fmu "),
         (["identify", "x.toml", "--workers", "0"], "--workers"),
         (["identify", "x.toml", "--sed", "1"], "--seed"),
         (["identify", "no/such.toml"], "no/such.toml"),
@@ -91,7 +104,7 @@ def test_help_imports_nothing_heavy() -> None:
     ],
 )
 def test_mistakes_on_the_command_line(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+    capsys: pytest.CaptureFixture[str], arguments: list[object], words: str
 ) -> None:
     code, err = outcome(capsys, *arguments)
     assert code == 2
@@ -184,7 +197,8 @@ def test_an_fmu_that_is_none(
         (FmuError("broken.fmu is broken."), 2, "error: broken.fmu is broken."),
         (MissingExtraError("Reading MF4", "mf4"), 2, "pip install 'thsa-cosim[mf4]'"),
         (StudyError("nothing\nworked."), 3, "error: nothing worked."),
-        (PermissionError(13, "Permission denied", "/root/x"), 2, "Permission denied (/root/x)"),
+        (PermissionError(13, "Permission denied", "/root/x"), 2, "Permission denied (/root/x); allow it"),
+        (OSError(28, "No space left on device"), 3, "No space left on device; make room, and give the same"),
         (RuntimeError("boom"), 3, "internal fault, please report it: RuntimeError: boom"),
         (KeyboardInterrupt(), 130, "interrupted"),
     ],

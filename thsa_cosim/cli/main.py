@@ -4,6 +4,7 @@ Exit codes: 0 done, 2 bad input (one sentence on stderr), 3 the study ran but ha
 130 interrupted. Set THSA_COSIM_DEBUG=1 to see the traceback of an error.
 """
 
+import errno
 import os
 import sys
 import traceback
@@ -44,6 +45,14 @@ COMMANDS: tuple[click.Command, ...] = (
 )
 
 
+#: What helps against an error of the operating system, and the exit code.
+_REMEDIES = {
+    errno.ENOSPC: ("; make room, and give the same command again", 3),
+    errno.EACCES: ("; allow it, or choose another place", 2),
+    errno.EROFS: ("; choose another place", 2),
+}
+
+
 class _Cli(click.Group):
     """A group whose errors are single sentences and whose commands keep their order."""
 
@@ -61,10 +70,17 @@ class _Cli(click.Group):
             raise click.UsageError(f"There is no command {args[0]!r}.{hint}", ctx) from error
 
 
-@click.group(cls=_Cli, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(
+    cls=_Cli,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
 @click.version_option(__version__, prog_name="thsa-cosim")
-def cli() -> None:
+@click.pass_context
+def cli(context: click.Context) -> None:
     """Identify, tune and diagnose electromechanical actuators with FMUs and bench recordings."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 for _command in COMMANDS:
@@ -86,6 +102,9 @@ def run_command(arguments: list[str]) -> int:
         return code if isinstance(code, int) else 0
     except click.exceptions.Exit as exit_:
         return exit_.exit_code
+    except click.MissingParameter as error:
+        usage = "" if error.ctx is None else f" Usage: {error.ctx.get_usage().removeprefix('Usage: ')}."
+        return _fail(f"{error.format_message()}{usage}", 2)
     except click.ClickException as error:
         return _fail(error.format_message(), 2)
     except ThsaCosimError as error:
@@ -100,7 +119,8 @@ def run_command(arguments: list[str]) -> int:
         return 0
     except OSError as error:
         where = f" ({error.filename})" if error.filename else ""
-        return _fail(f"{error.strerror or error}{where}.", 2)
+        remedy, code = _REMEDIES.get(error.errno or 0, ("", 2))
+        return _fail(f"{error.strerror or error}{where}{remedy}.", code)
     except MemoryError:
         return _fail("there is not enough memory: use shorter recordings, longer steps or fewer workers.", 3)
     except Exception as error:

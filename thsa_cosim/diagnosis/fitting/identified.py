@@ -48,7 +48,7 @@ def between_starts(best: Fit, ends: Sequence[tuple[FloatArray, float]]) -> Float
 
 
 def _runs(bench: Bench, unknowns: Unknowns, start: FloatArray) -> tuple[FloatArray, FloatArray | None]:
-    """``start`` (n,) and its residuals (N,), or those of a vector beside it where a solver fails at that very point."""
+    """``start`` (n,) and its residuals (N,), or those of a vector close by where a solver fails at that very point."""
     (residual,) = bench.residuals(unknowns, start[None, :], "fit")
     if residual is not None:
         return start, residual

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from blind_score import estimates, read_score
+from blind_score import estimates, moved, read_score
 from scipy.stats import binomtest
 
 INSIDE = 1.96
@@ -43,8 +43,10 @@ def stated(unit: str, label: Mapping[str, Any], result: Mapping[str, Any]) -> It
     """Every number of a result that has a truth to compare with."""
     for effect in label["effects"]:
         for entry in result["effects"]:
-            if entry["name"].split(":")[0] == effect["name"]:
-                for name, value, stderr, truth in estimates(effect["coefficients"], entry["parameters"]):
+            own, _, place = entry["name"].partition(":")
+            if own == effect["name"]:
+                true = moved(effect, place, label["rig"])
+                for name, value, stderr, truth in estimates(true, entry["parameters"]):
                     yield Stated(unit, "effect", f"{effect['name']} {name}", value, stderr, truth)
     found = result["parameters"]["after" if result["effects"] else "before"]
     for name, entry in found.items():

@@ -1,7 +1,9 @@
 """Scores of the blind benchmark: a unit's label against its result.json, and what all of them reach.
 
 Names count as in the contract: what follows a colon is a location, `equivalent` names of the first effect are a
-tie that these data allow, and more than two of them are no answer. The noise floor is the sensors' own.
+tie that these data allow, and more than two of them are no answer. A place is right if it is named, or in the tie.
+Motor and gearbox turn as one: a speed or an angle stated at one is compared at the other by the gear's ratio. The noise
+floor is the sensors' own.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ from thsa_cosim.units import convert
 
 NONE, UNEXPLAINED, FAILED = "no-missing-effect", "unexplained-structure", "no result"
 MOST_TIES = 2
+#: Where an effect that can act at several places is, by the last word of its fields; as the model calls it.
+PLACES = {"motor": "motor", "gear": "gearbox", "nut": "screw"}
 HELD_OUT = 1.1  # goal: rmse over the noise floor
 
 
@@ -32,6 +36,8 @@ class Reported:
     name: str
     ties: tuple[str, ...]
     parameters: Mapping[str, Mapping[str, Any]]
+    place: str = ""
+    places: tuple[str, ...] = ()  # of the same effect, those of the tie included
 
     def covers(self, truth: str) -> bool:
         return truth == self.name or (truth in self.ties and len(self.ties) <= MOST_TIES)
@@ -53,6 +59,9 @@ class Score:
     alone: bool  # right, and nothing else named
     held_out: float | None  # largest rmse over noise floor on the validate recordings, after
     covered: tuple[bool, ...]  # true coefficients inside their 95 % intervals
+    placed: tuple[
+        bool, ...
+    ]  # of the effects rightly named that can be at several places: named there, or tied
     seconds: float | None
 
     @property
@@ -95,20 +104,54 @@ def score(
         first=first,
         right=right,
         alone=right and len(reported) == len(truth if kind in ("single", "pair") else ()),
-        held_out=None if result is None else _held_out(result),
+        held_out=None if result is None else held_out(result),
         covered=tuple(
             inside
             for effect in label["effects"]
             if effect["name"] in pairing and pairing[effect["name"]].name == effect["name"]
-            for inside in _covered(effect["coefficients"], pairing[effect["name"]].parameters)
+            for inside in _covered(
+                moved(effect, pairing[effect["name"]].place, label.get("rig", {})),
+                pairing[effect["name"]].parameters,
+            )
+        ),
+        placed=tuple(
+            place in pairing[effect["name"]].places
+            for effect in label["effects"]
+            if effect["name"] in pairing and pairing[effect["name"]].name == effect["name"]
+            if (place := place_of(effect)) and pairing[effect["name"]].place
         ),
         seconds=seconds,
     )
 
 
 def _reported(entry: Mapping[str, Any]) -> Reported:
-    ties = tuple(str(name).split(":")[0] for name in entry.get("equivalent", []))
-    return Reported(str(entry["name"]).split(":")[0], ties, entry.get("parameters", {}))
+    names = [str(name).partition(":") for name in (entry["name"], *entry.get("equivalent", []))]
+    own, _, place = names[0]
+    places = tuple(where for name, _, where in names if name == own and where)
+    return Reported(own, tuple(name for name, _, _ in names[1:]), entry.get("parameters", {}), place, places)
+
+
+def place_of(effect: Mapping[str, Any]) -> str:
+    """The place of a label's effect, as the model calls it; "" where its fields name none, or several."""
+    found = {
+        place
+        for field in effect.get("fields", {})
+        for word, place in PLACES.items()
+        if word in field.split("_")
+    }
+    return found.pop() if len(found) == 1 else ""
+
+
+def moved(effect: Mapping[str, Any], place: str, rig: Mapping[str, float]) -> list[dict[str, Any]]:
+    """True coefficients as they are at ``place``: of motor and gearbox, by the gear's ratio, speeds and angles."""
+    true = place_of(effect)
+    coefficients = [dict(c) for c in effect["coefficients"]]
+    if {true, place} == {"motor", "gearbox"} and "i" in rig:
+        ratio = rig["i"] if place == "motor" else 1.0 / rig["i"]
+        for c in coefficients:
+            if c["unit"] in ("rad/s", "rad"):
+                c["value"] *= ratio
+    return coefficients
 
 
 def _pairing(truth: Sequence[str], reported: Sequence[Reported]) -> dict[str, Reported]:
@@ -123,7 +166,7 @@ def _pairing(truth: Sequence[str], reported: Sequence[Reported]) -> dict[str, Re
     return best
 
 
-def _held_out(result: Mapping[str, Any]) -> float | None:
+def held_out(result: Mapping[str, Any]) -> float | None:
     """Largest rmse over the floor of the channels after, or before where nothing was added."""
     after = result.get("after", {}).get("validate") or result.get("before", {}).get("validate") or {}
     ratios = [channel["rmse"] / FLOOR[name] for name, channel in after.items() if name in FLOOR]
@@ -178,6 +221,7 @@ def summary(scores: Sequence[Score]) -> str:
         "goal                                            reached          95 % interval",
         _goal("right class first", ">= 95 %", by_kind["single"], lambda s: s.right),
         _goal("  ... and no other named", "", by_kind["single"], lambda s: s.alone),
+        _goal("right place, or a tie that holds it", ">= 95 %", [p for s in scores for p in s.placed], bool),
         _goal("false alarms on clean units", "<= 2 %", by_kind["clean"], lambda s: not s.quiet),
         _goal("  ... that name an effect", "", by_kind["clean"], lambda s: bool(s.names)),
         _goal("outside effects flagged", ">= 90 %", by_kind["outside"], lambda s: s.flagged),

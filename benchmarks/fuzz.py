@@ -44,15 +44,13 @@ def main() -> int:
     arguments = parser.parse_args()
     warm_up()
     kinds = tuple(arguments.kind or (kind for kind in KINDS if kind != "diagnosis"))
-    scratch = Path(
-        tempfile.mkdtemp(prefix="fuzz-")
-    )  # a TemporaryDirectory would be deleted by every fork's exit
+    # A TemporaryDirectory would be deleted by every fork's exit.
+    scratch = Path(tempfile.mkdtemp(prefix="fuzz-"))
     try:
         base = (arguments.keep or scratch).resolve()
         base.mkdir(parents=True, exist_ok=True)
-        os.environ[CACHE] = str(
-            scratch / "cache"
-        )  # the same run with a full cache of one's own and with an empty one
+        # The same run with a full cache of one's own and with an empty one.
+        os.environ[CACHE] = str(scratch / "cache")
         material = scratch / "material"
         write_material(material)
         if broken := prepare(kinds, material, scratch, arguments.deadline):

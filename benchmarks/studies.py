@@ -43,7 +43,6 @@ SHIPPED = (*FIRST, *sorted({path.stem for path in SCENARIOS.glob("*.toml")} - se
 EMPS = HERE.parent.parent / "shared" / "emps" / "DATA_EMPS.mat"
 #: Scenarios beside which a script runs.
 IDENTIFIED, TUNED = ("motor", "screw", "gearbox"), ("table4", "feedforward")
-FROM_EMPS = ("emps", "emps_stroke")
 #: What counts as report, and as export: functions by the room they are in.
 REPORT = (
     ("thsa_cosim.report.identify.files", "write_identify"),
@@ -77,7 +76,7 @@ def one(name: str, folder: Path) -> dict[str, Any]:
         for module, function in places:
             _clocked(module, function, part, spent)
     runs = _counted()
-    data = ["--fit", str(EMPS), "--validate", str(EMPS)] if name in FROM_EMPS else []
+    data = ["--fit", str(EMPS), "--validate", str(EMPS)] if name == "emps" else []
     code = run_command(
         [
             command(name),
@@ -187,7 +186,7 @@ def _points(name: str) -> Any:
     from thsa_cosim.identify.problem import build_point
     from thsa_cosim.scenario import StagedScenario, load
 
-    files = {"fit": [EMPS], "validate": [EMPS]} if name in FROM_EMPS else {}
+    files = {"fit": [EMPS], "validate": [EMPS]} if name == "emps" else {}
     study = load(SCENARIOS / f"{name}.toml", **files)
     parts = [s.scenario for s in study.stages] if isinstance(study, StagedScenario) else [study]
     for scenario in parts:
@@ -242,7 +241,7 @@ def task(name: str, count: int) -> list[dict[str, Any]]:
 
 def measure(name: str, output: Path, script_points: int, start_s: float) -> None:
     """Print one line of the table, and the comparison with the script where there is one."""
-    if name in FROM_EMPS and not EMPS.exists():
+    if name == "emps" and not EMPS.exists():
         print(f"{name:12s} left out: {EMPS} is not there")
         return
     folder = output / name

@@ -184,6 +184,7 @@ HEAD = '<ParameterSet xmlns="http://ssp-standard.org/SSP1/SystemStructureParamet
     [
         ('<Integer value="4"/>', 4.0),
         ('<Boolean value="true"/>', 1.0),
+        ('<Boolean value="0"/>', 0.0),
         ('<Real value=" 1e-3 "/>', 1e-3),
     ],
 )
@@ -199,7 +200,8 @@ def test_ssv_reads_numbers_of_other_tools(tmp_path, body, expected):
         ("", "no XML file"),
         ("<a/>", "holds 'a', not the ParameterSet"),
         (HEAD, "no XML file"),
-        (f'{HEAD}<Parameters><Parameter name="p"><String value="x"/>{END}', "String"),
+        (f'{HEAD}<Parameters><Parameter name="p"><Binary value="x"/>{END}', "holds Binary"),
+        (f'{HEAD}<Parameters><Parameter name="p"><Integer value="1 2"/>{END}', "holds an array"),
         (f'{HEAD}<Parameters><Parameter name="p"><Real value="x"/>{END}', "'x' is no"),
         (f'{HEAD}<Parameters><Parameter name="p">{END}', "nothing"),
         (

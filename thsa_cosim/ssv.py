@@ -34,6 +34,8 @@ class ParameterSet:
     description: str = ""
     others: Mapping[str, str] = field(default_factory=dict)
     """Types of the values that are no numbers (String, Enumeration, Binary), by name."""
+    texts: Mapping[str, str] = field(default_factory=dict)
+    """Values of those that are a String or the name of an item of an Enumeration."""
 
 
 def write_ssv(path: Path, parameters: ParameterSet) -> None:
@@ -79,12 +81,12 @@ def write_ssv(path: Path, parameters: ParameterSet) -> None:
 
 
 def read_ssv(path: Path) -> ParameterSet:
-    """Read an SSV file (1.0 or 2.0); numbers and Boolean values come back as floats.
+    """Read an SSV file (1.0 or 2.0); numbers and Boolean values come back as floats, the rest as ``texts``.
 
     Raises
     ------
     ParameterError
-        If the file is missing, is no SSV file, or sets a String, Enumeration or Binary.
+        If the file is missing, is no SSV file, or sets an array, a Binary, or nothing.
     """
     try:
         root = ET.parse(path).getroot()
@@ -99,7 +101,10 @@ def parse_ssv(root: ET.Element, path: Path | str) -> ParameterSet:
     """Read a ParameterSet element; ``path`` is what messages name. Raises as :func:`read_ssv` does."""
     parameters = parse_parameter_set(root, path)
     for name, kind in parameters.others.items():
-        raise ParameterError(f"{path}: parameter {name!r} holds {kind}; only numbers can be set.")
+        if name not in parameters.texts:
+            raise ParameterError(
+                f"{path}: parameter {name!r} holds {kind}; only numbers and texts can be set, so remove it."
+            )
     for name, unit in parameters.units.items():
         _known_unit(path, name, unit)
     return parameters
@@ -112,22 +117,40 @@ def parse_parameter_set(root: ET.Element, path: Path | str) -> ParameterSet:
     values: dict[str, float] = {}
     units: dict[str, str] = {}
     others: dict[str, str] = {}
+    texts: dict[str, str] = {}
+    items = _enumerations(root)
     for parameter in root.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
         name = parameter.get("name", "")
         if name in values or name in others:
             raise ParameterError(f"{path}: parameter {name!r} is set twice; remove one.")
         child = next((e for e in parameter if e.tag.startswith(f"{{{SSV}}}")), None)
         kind = "nothing" if child is None else child.tag.removeprefix(f"{{{SSV}}}")
+        given = "" if child is None else child.get("value", "")
+        if child is not None and kind == "Enumeration" and (child.get("name", ""), given) in items:
+            values[name] = items[child.get("name", ""), given]
+            continue
         if child is None or kind not in _NUMBERS:
             others[name] = kind
+            if child is not None and kind in ("String", "Enumeration") and "value" in child.attrib:
+                texts[name] = given
             continue
-        if kind not in FLOATS or len(child.get("value", "").split()) < 2:
-            values[name] = _number(path, name, kind, child.get("value", "").strip())
+        if len(given.split()) < 2:
+            values[name] = _number(path, name, kind, given.strip())
         else:
             others[name] = "an array"
         if kind in FLOATS and child.get("unit"):
             units[name] = child.get("unit", "")
-    return ParameterSet(root.get("name", ""), values, units, root.get("description", ""), others)
+    return ParameterSet(root.get("name", ""), values, units, root.get("description", ""), others, texts)
+
+
+def _enumerations(root: ET.Element) -> dict[tuple[str, str], float]:
+    """Numbers of the items of the enumerations that the file itself defines, by (enumeration, item)."""
+    return {
+        (enumeration.get("name", ""), item.get("name", "")): float(item.get("value", ""))
+        for enumeration in root.iterfind(f"{{{SSV}}}Enumerations/{{{SSC}}}Enumeration")
+        for item in enumeration.iterfind(f"{{{SSC}}}Item")
+        if item.get("value", "").lstrip("-").isdecimal()
+    }
 
 
 def _known_unit(path: Path | str, name: str, unit: str) -> None:
@@ -138,12 +161,16 @@ def _known_unit(path: Path | str, name: str, unit: str) -> None:
 
 
 def _number(path: Path | str, name: str, kind: str, text: str) -> float:
-    if kind == "Boolean" and text in ("true", "false"):
-        return float(text == "true")
+    if kind == "Boolean":
+        if text not in ("true", "false", "1", "0"):
+            raise ParameterError(f"{path}: parameter {name!r}: {text!r} is no Boolean; give true or false.")
+        return float(text in ("true", "1"))
     try:
         number = float(text)
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
         raise ParameterError(f"{path}: parameter {name!r}: {text!r} is no finite number.")
+    if kind not in FLOATS and not number.is_integer():
+        raise ParameterError(f"{path}: parameter {name!r} is of type {kind}: {text!r} is no whole number.")
     return number

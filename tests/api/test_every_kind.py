@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 from rich.console import Console
+from small_scenario import toml
 
 import thsa_cosim as tc
-from thsa_cosim.api.conduct import KINDS, ask, conduct
+from thsa_cosim import cli
+from thsa_cosim.api.conduct import KINDS, Conducted, ask, conduct
 from thsa_cosim.diagnosis import run as diagnosis
 from thsa_cosim.diagnosis.results import (
     Balance,
@@ -36,7 +38,7 @@ from thsa_cosim.diagnosis.results import (
 from thsa_cosim.identify import ForceBalance
 from thsa_cosim.inspection import Finding, Inspection
 from thsa_cosim.report.page import write_page
-from thsa_cosim.scenario import Scenario
+from thsa_cosim.scenario import Executor, Scenario
 from thsa_cosim.signals import Signals
 from thsa_cosim.study import Comparison
 
@@ -214,17 +216,59 @@ def strict(text: str) -> Any:
     return json.loads(text, parse_constant=refuse)
 
 
+def forbidden(*_: Any) -> Any:
+    raise AssertionError("a finished study was run again")
+
+
 def test_no_kind_is_left_out() -> None:
     assert {command for command, _ in SMALLEST.values()} == set(KINDS)
 
 
+def files_of(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def check_that_it_is_shown_again(
+    done: Conducted, scenario: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The command, given on the finished folder: the same output, exit code and files, and nothing is simulated."""
+    command, folder = done.asked.kind.name, done.folder
+    words = [command, str(scenario), "-o", str(folder), "--no-report", "--workers", "1"]
+    words += ["--no-export-fmu"] if command == "identify" else []
+    before, tables = files_of(folder), Console(file=StringIO(), width=140)
+    done.show(tables)
+    with monkeypatch.context() as idle:  # whatever simulates, decides or writes a study is gone
+        idle.setattr(Executor, "open_runner", forbidden)
+        for kind in KINDS.values():
+            idle.setattr(type(kind), "run", forbidden)
+            idle.setattr(type(kind), "write", forbidden)
+        capsys.readouterr()
+        code = cli.run_command(words)
+    shown, told = capsys.readouterr()
+    assert shown.startswith(tables.file.getvalue())  # type: ignore[attr-defined]
+    sentence = f"{folder} holds this study, complete: it is shown again, and nothing is simulated."
+    assert told.splitlines().count(sentence) == 1
+    assert (code, done.objection in told) == (3 if done.objection else 0, True)
+    assert files_of(folder) == before
+    if command != "diagnose":  # which is shown from its result alone
+        (folder / "result.json").write_text('{"status": "complete"}', encoding="utf-8")
+        monkeypatch.setattr(Executor, "open_runner", forbidden)
+        cli.run_command(words)
+        assert "a finished study was run again" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", SMALLEST)
-def test_a_study_of_every_kind_is_written_printed_drawn_and_opened(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_study_of_every_kind_is_written_printed_drawn_opened_and_shown_again(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(diagnosis, "_diagnose", everything)
     command, make = SMALLEST[name]
-    asked = ask(command, make(tmp_path) if make is stages else make(), folder=tmp_path / "study", workers=1)
+    scenario = tmp_path / "asked.toml"
+    if make is stages:
+        scenario = make(tmp_path)
+    else:
+        scenario.write_text(toml(make()), encoding="utf-8")
+    asked = ask(command, scenario, folder=tmp_path / "study", workers=1)
     done = conduct(asked, quiet=True)
     assert done.status == "complete"
     assert done.files
@@ -252,6 +296,7 @@ def test_a_study_of_every_kind_is_written_printed_drawn_and_opened(
     study = tc.open_study(done.folder)
     assert type(study) is KINDS[command].study
     assert study.result == result
+    check_that_it_is_shown_again(done, scenario, monkeypatch, capsys)
 
 
 def test_values_that_no_polish_has_looked_at_are_not_called_undetermined(tmp_path: Path) -> None:

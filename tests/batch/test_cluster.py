@@ -1,5 +1,6 @@
 """The same jobs on a Dask cluster: a scheduler and two workers, started by hand as the docs say."""
 
+import gc
 import os
 import re
 import signal
@@ -19,7 +20,7 @@ from fmu_sources import build
 
 from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
 from thsa_cosim.batch.cluster import ClusterRunner
-from thsa_cosim.errors import MissingExtraError, StudyError
+from thsa_cosim.errors import InputError, MissingExtraError
 from thsa_cosim.fmu.description import DefaultExperiment
 from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.signals import FloatArray, Signals
@@ -170,8 +171,17 @@ def _folders(folder: Path) -> list[str]:
 
 
 def test_no_scheduler_is_one_sentence() -> None:
-    with pytest.raises(StudyError, match=r"No Dask scheduler answers at tcp://127\.0\.0\.1:\d+"):
+    with pytest.raises(InputError, match=r"No Dask scheduler answers at tcp://127\.0\.0\.1:\d+ .*; start it"):
         ClusterRunner([experiment()], f"tcp://127.0.0.1:{_free_port()}", timeout_s=0.5)
+
+
+def test_an_address_that_is_none_is_refused_at_once(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(
+        InputError, match="'nonsense' is no address of a Dask scheduler; give its host and port"
+    ):
+        ClusterRunner([experiment()], "nonsense")
+    gc.collect()
+    assert capfd.readouterr().err == "", "no client is torn down with a traceback"
 
 
 def test_missing_extra_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:

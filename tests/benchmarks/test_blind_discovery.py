@@ -143,6 +143,21 @@ def test_a_unit_counts_if_its_law_is_within_the_goal_and_a_clean_one_if_there_is
     assert "clean units without a law          all      1 of 1" in text
 
 
+def test_a_unit_that_other_effects_explain_to_the_noise_is_imitated_and_still_missed():
+    imitated = replace(discovery(False, 1.0, "asymmetric-friction:motor"), held_out=1.01)
+    assert imitated.imitated
+    assert not imitated.found
+    assert not replace(imitated, held_out=1.3).imitated, "something is left that a law could explain"
+    assert not replace(imitated, held_out=None).imitated
+    assert not replace(imitated, rms=0.03).imitated, "its total is the true law"
+    assert not replace(imitated, law=("asymmetric-friction:motor", "0.1 N.m 1@motor")).imitated
+    assert not replace(imitated, clean=True).imitated
+    text = summary((imitated, discovery(False, 0.02, "0.1 N.m v^3@motor")))
+    assert "found law within 5 % (rms)         >= 80 %  1 of 2" in text
+    assert "of units not imitated" in text
+    assert "1 of 1" in text
+
+
 def test_the_effect_is_removed_and_a_law_asked_for():
     content = without("windage", BENCHMARKS.parent / "scenarios" / "driven.toml")
     assert "windage" not in content["diagnose"]["effects"]

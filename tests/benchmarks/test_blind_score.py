@@ -115,6 +115,43 @@ def test_coefficients_are_compared_by_dimension(true, found, inside) -> None:
     assert scored.covered == inside
 
 
+def placed(field: str, value: float, unit: str, found: dict) -> Score:
+    coefficient = {"value": value, "unit": unit, "words": []}
+    true = {"name": "stribeck", "form": "some", "fields": {field: 1.0}, "coefficients": [coefficient]}
+    truth = {"kind": "single", "strength": "weak", "effects": [true], "rig": {"i": 30.0}}
+    return score("u0001", truth, result(MISSING, found), 10.0)
+
+
+@pytest.mark.parametrize(
+    ("names", "right"),
+    [
+        (("stribeck:motor",), True),
+        (("stribeck:gearbox", "stribeck:motor"), True),  # a tie that holds it
+        (("stribeck:gearbox",), False),
+        (("stribeck:gearbox", "windage:motor"), False),  # another effect there is no place of this one
+    ],
+)
+def test_a_place_is_right_if_it_is_named_or_in_the_tie(names, right) -> None:
+    found = placed("stribeck_motor", 6.0, "rad/s", effect(*names, v_S=(6.0, "rad/s", 0.1)))
+    assert found.right
+    assert found.placed == (right,)
+
+
+@pytest.mark.parametrize(
+    ("field", "unit", "place", "value", "inside"),
+    [
+        ("stribeck_motor", "rad/s", "gearbox", 0.2, True),
+        ("stribeck_motor", "rad/s", "gearbox", 6.0, False),
+        ("stribeck_motor", "rad/s", "motor", 6.0, True),
+        ("run_in_gear", "rad", "motor", 180.0, True),
+        ("stribeck_nut", "rad/s", "motor", 180.0, False),  # the nut has a spring to the shaft
+    ],
+)
+def test_motor_and_gearbox_turn_as_one(field, unit, place, value, inside) -> None:
+    found = effect(f"stribeck:{place}", scale=(value, unit, 0.01 * value))
+    assert placed(field, 6.0, unit, found).covered == (inside,)
+
+
 def test_summary_counts_each_goal_on_its_own_units() -> None:
     scores = [
         judged("single", ("windage",), result(MISSING, effect("windage"))),

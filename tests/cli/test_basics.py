@@ -77,12 +77,25 @@ def test_help_imports_nothing_heavy() -> None:
     assert done.returncode == 0, done.stderr
 
 
+def test_the_command_alone_shows_its_help() -> None:
+    done = run()
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("Usage: thsa-cosim")
+    assert "\n  identify " in done.stdout, "one command a line"
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["identfy", "x.toml"], "Did you mean 'identify'?"),
         (["frobnicate"], "Known commands: export, check, init, simulate, identify"),
-        (["identify"], "Missing argument 'SCENARIO'"),
+        (["identify"], "Missing argument 'SCENARIO'. Usage: thsa-cosim identify [OPTIONS] SCENARIO."),
+        (["identify", ROOT / "scenarios"], "is a folder; name a scenario file (.toml), such as "),
+        (
+            ["identify", ROOT / "fmus" / "Motor.fmu"],
+            "is a model, no scenario file (.toml); 'thsa-cosim init ",
+        ),
+        (["tune", ROOT / "scenarios" / "recordings" / "motor_m30.parquet"], "'thsa-cosim init MODEL.fmu "),
         (["identify", "x.toml", "--workers", "0"], "--workers"),
         (["identify", "x.toml", "--sed", "1"], "--seed"),
         (["identify", "no/such.toml"], "no/such.toml"),
@@ -91,7 +104,7 @@ def test_help_imports_nothing_heavy() -> None:
     ],
 )
 def test_mistakes_on_the_command_line(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+    capsys: pytest.CaptureFixture[str], arguments: list[object], words: str
 ) -> None:
     code, err = outcome(capsys, *arguments)
     assert code == 2

@@ -155,16 +155,18 @@ def test_tables_are_printed_plainly_into_a_pipe(study) -> None:
     assert "0 failed" in err
 
 
-def test_the_finished_study_is_taken_from_its_journal(study, here: Here) -> None:
-    scenario, folder, _ = study
-    before = result_of(folder)
-    rows = len((folder / "journal.csv").read_text().splitlines())
+def test_the_finished_study_is_shown_again(study, here: Here) -> None:
+    scenario, folder, first = study
     held_out = ROOT / "scenarios" / "recordings" / "motor_m10.parquet"
-    again = here("identify", scenario, "--validate", held_out, "-o", folder, "--json", "--workers", 1)
+    words = ("identify", scenario, "--validate", held_out, "-o", folder, "--workers", 1)
+    before, result = (folder / "journal.csv").read_bytes(), result_of(folder)
+    again = here(*words)
     assert again.returncode == 0, again.stderr
-    assert json.loads(again.stdout) == before
-    assert len((folder / "journal.csv").read_text().splitlines()) == rows
-    assert "from the journal" in again.stderr
+    assert again.stdout == first.stdout
+    assert "nothing is simulated" in again.stderr
+    assert "runs" not in again.stderr
+    assert json.loads(here(*words, "--json", "--quiet").stdout) == result == result_of(folder)
+    assert (folder / "journal.csv").read_bytes() == before
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])

@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from thsa_cosim.report.progress import ProgressDisplay, console
+from thsa_cosim.study import Progress
+
 ROOT = Path(__file__).parents[2]
 ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 COLOUR = re.compile(r"\x1b\[(?:\d+;)*(?:3[0-7]|9[0-7]|38;[0-9;]+)m")
@@ -97,6 +100,25 @@ def test_a_pipe_gets_plain_text_and_quiet_nothing(scenario: Path, tmp_path: Path
     assert max(map(len, tables)) <= 140
     again = subprocess.run([*words, "--quiet"], capture_output=True, text=True, timeout=120, check=True)
     assert again.stdout + again.stderr == ""
+
+
+def test_a_reader_that_leaves_is_no_failure() -> None:
+    """As in ``thsa-cosim example | head -1``."""
+    read, write = os.pipe()
+    os.close(read)
+    words = [sys.executable, "-m", "thsa_cosim.cli", "example"]
+    done = subprocess.run(words, stdout=write, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_step_is_said_once(capsys: pytest.CaptureFixture[str]) -> None:
+    """A stage tells each of its own steps under the same name."""
+    with ProgressDisplay(console(stderr=True)) as display:
+        for stage in ("stage 1 of 2", "stage 1 of 2", "stage 2 of 2", "stage 1 of 2"):
+            display(Progress(stage))
+    said = [line.partition(" s  ")[2] for line in capsys.readouterr().err.splitlines()]
+    assert said == ["stage 1 of 2", "stage 2 of 2", "stage 1 of 2"]
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")

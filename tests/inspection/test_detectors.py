@@ -57,10 +57,6 @@ TRUE_FINDINGS = {
     },  # uneven stamps, counts, a goal at rest, a full duty
     "cogging": {"jitter"},
     "warm_up": {"temperature-drift"},
-    "redundant": {
-        "spikes",
-        "step",
-    },  # the blow of a load path that breaks, the current of the lane that remains
 }
 """Recordings of machines, and of failures, on which there is something to report."""
 

@@ -1,13 +1,14 @@
 """What makes two runs the same study: every key of every kind counts, and files count by their content."""
 
 import json
+import re
 import shutil
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from types import UnionType
+from types import SimpleNamespace, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
 import numpy as np
@@ -19,14 +20,14 @@ from thsa_cosim.scenario import KINDS, Table, load
 from thsa_cosim.scenario.schema import StagesTable
 from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.ssv import ParameterSet, write_ssv
-from thsa_cosim.study import digest_of_recording, identity, stages_identity, study_identity
-from thsa_cosim.study.digest import digest_of_folder
+from thsa_cosim.study import digest_of_recording, identity, shown_words, stages_identity, study_identity
+from thsa_cosim.study.digest import digest_of_file, digest_of_folder
 from thsa_cosim.study.folder import changed
 from thsa_cosim.study.identity import BY_CONTENT, SHOWN_ONLY, _plain, flatten
 
 ALL_KINDS: dict[str, type[Table]] = {**KINDS, "tune": TuneTable, "stages": StagesTable}
 #: Keys of a kind that are read off a scenario's table: fewer would mean that the walk below has lost some.
-AT_LEAST = {"identify": 66, "simulate": 38, "diagnose": 85, "tune": 82, "stages": 1}
+AT_LEAST = {"identify": 95, "simulate": 68, "diagnose": 119, "tune": 135, "stages": 1}
 
 
 def tables_in(annotation: Any) -> tuple[type[Table] | None, type | None]:
@@ -83,6 +84,17 @@ def test_every_key_of_every_kind_counts(kind: str) -> None:
         assert any(last in k.rsplit("[", 1)[-1] or k.endswith(" (order)") for k in keys), (key, keys)
         counted.append(key)
     assert len(counted) == len(set(counted)) >= AT_LEAST[kind], f"{kind}: {len(counted)} keys"
+
+
+@pytest.mark.parametrize("kind", sorted(set(ALL_KINDS) - {"stages"}))
+def test_what_is_shown_only_is_kept_apart_and_all_of_it(kind: str) -> None:
+    cls = ALL_KINDS[kind]
+    scenario = SimpleNamespace(table=filled(cls, {}))
+    words = shown_words(scenario)  # type: ignore[arg-type]
+    assert {re.sub(r"\[.*?\]", "", key) for key in words} == {k for k in keys_of(cls) if k in SHOWN_ONLY}
+    for key in SHOWN_ONLY:
+        if key in keys_of(cls):
+            assert shown_words(SimpleNamespace(table=filled(cls, {key: "other"}))) != words  # type: ignore[arg-type]
 
 
 def test_what_is_left_out_is_in_the_schema_still() -> None:
@@ -196,6 +208,8 @@ def test_stages_count_with_all_that_they_ask(folder: Path) -> None:
     (folder / "one.toml").write_text(toml(data))
     after = stages_identity(load(stages))  # type: ignore[arg-type]
     assert changed(before, after) == ["stages[one].parameters[R_s].upper"]
+    words = shown_words(load(stages))
+    assert words["stages[one].title"] == data["title"]
     stages.write_text(toml({"kind": "identify", "stages": [{"scenario": "one.toml", "give": ["J"]}]}))
     again = stages_identity(load(stages))  # type: ignore[arg-type]
     assert changed(after, again) == ["stages[one].give"]
@@ -257,6 +271,32 @@ def test_a_tuning_counts_its_start_values_and_how_sure_they_are(folder: Path, id
     assert changed(before, study_identity(loaded(folder, tuning()))) == ["start values.motor.gain"]
     sure = study_identity(loaded(folder, {k: v for k, v in tuning().items() if k != "uncertainty"}))
     assert not [key for key in sure if key.startswith("uncertainty")]
+
+
+def test_a_tuning_counts_what_is_in_its_profiles_and_not_where_they_are(folder: Path) -> None:
+    data = {
+        **{k: v for k, v in tuning().items() if k not in ("uncertainty",)},
+        "command": {"input": "w_cmd", "output": "w_m", "unit": "rad/s", "shape": "recorded"},
+        "profile": {
+            "recordings": ["runs/warm.csv"],
+            "time": {"column": "time", "unit": "s"},
+            "columns": {"w_cmd": {"column": "command", "unit": "rad/s"}},
+        },
+        "metrics": {"window": [0.3, 0.4]},
+    }
+    before = study_identity(loaded(folder, data))
+    (folder / "runs" / "warm.csv").rename(folder / "warm.csv")
+    data["profile"]["recordings"] = ["warm.csv"]
+    assert study_identity(loaded(folder, data)) == before
+    edit(folder / "warm.csv", ",10,", ",9,")
+    assert changed(before, study_identity(loaded(folder, data))) == ["profile.recordings[warm]"]
+
+
+def test_a_file_is_known_by_its_content(tmp_path: Path) -> None:
+    file = tmp_path / "curve.txt"
+    file.write_bytes(b"abc")
+    # FIPS 180-2, appendix B.1
+    assert digest_of_file(file) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
 
 
 def test_a_scenario_is_asked_key_by_key(folder: Path) -> None:

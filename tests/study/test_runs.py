@@ -187,6 +187,33 @@ def test_large_outcomes_are_kept_as_far_as_the_disk_has_room(
     assert kept(10**12) == 1
 
 
+def test_a_full_log_stops_growing_keeps_what_came_first_and_says_so_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(runs, "LARGEST", 50_000)
+    with RunLog.open(tmp_path / RUNS, said.append) as log:
+        for k in range(100):
+            log.append(bytes([k]) * 16, Outcome(Status.OK, reduced=np.full(1000, float(k))))
+        assert log.left_out == 94
+        assert log.known(bytes([5]) * 16) is not None
+        assert log.known(bytes([6]) * 16) is None
+    assert (tmp_path / RUNS).stat().st_size <= 51_000
+    assert len(said) == 1
+    assert said[0].startswith("runs.log is full at 0 MB; further runs are not kept")
+
+
+def test_a_study_says_on_its_way_that_its_log_is_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(runs, "LARGEST", 0)
+    place = Place(tmp_path / "study", on_progress=lambda progress: told.append(progress.stage))
+    with Study.open(place, {"kind": "diagnose"}, {}) as study:
+        study._log.append(KEY, Outcome(Status.OK, reduced=np.zeros(1000)))
+    assert [text for text in told if "runs.log is full" in text]
+
+
 def test_only_what_is_not_known_is_run(tmp_path: Path, experiment: Experiment) -> None:
     jobs = [Job("fit/a", {"seed": float(k)}) for k in range(6)]
     first, second = Counting(stop_after=4), Counting()

@@ -337,7 +337,11 @@ WRONG = [
         'target="slow.taw"',
         "sets 'inner.slow.taw', but there is no such variable. Did you mean",
     ),
-    ('<ssv:Real value="-2"/>', '<ssv:String value="-2"/>', "'k' holds String; only numbers can be set"),
+    (
+        '<ssv:Real value="-2"/>',
+        '<ssv:String value="-2"/>',
+        "'k' holds String; only numbers can be set, so leave it out",
+    ),
     ('endElement="inner" endConnector="u"', 'endElement="inner" endConnector="y"', "joins two that send"),
     ("</ssd:SystemStructureDescription>", "", "is no valid XML"),
     ('name="fast"', 'name="fast" implementation="ScheduledExecution"', "asks for 'ScheduledExecution'"),
@@ -399,3 +403,32 @@ def test_units_that_do_not_convert_are_refused() -> None:
 def test_clocks_that_an_importer_has_to_tick_are_refused() -> None:
     with pytest.raises(FmuError, match=r"component 'a': .* has clocks that the importer has to tick"):
         assemble("s", [Part("a", build.clock3())], [], {})
+
+
+def test_an_item_of_an_enumeration_is_set_by_its_name(tmp_path: Path) -> None:
+    """The FMU of strict2.c: its parameter ``order`` is an enumeration of one, two, three."""
+    plain = '<ssd:ParameterBindings><ssd:ParameterBinding prefix="a."><ssd:ParameterValues>{}</ssd:ParameterValues>'
+    values = (
+        '<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" version="1.0"'
+        ' name="s"><ssv:Parameters><ssv:Parameter name="order"><ssv:Enumeration value="{}"/></ssv:Parameter>'
+        "</ssv:Parameters></ssv:ParameterSet>"
+    )
+    head = (
+        '<ssd:SystemStructureDescription xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"'
+        ' version="1.0" name="s"><ssd:System name="s">'
+    )
+    parts = '<ssd:Elements><ssd:Component name="a" source="a.fmu"/></ssd:Elements>'
+    tail = "</ssd:ParameterBinding></ssd:ParameterBindings>{}</ssd:System></ssd:SystemStructureDescription>"
+
+    def system(item: str) -> System:
+        path = tmp_path / "s.ssp"
+        with zipfile.ZipFile(path, "w") as file:
+            text = head + plain.format(values.format(item)) + tail.format(parts)
+            file.writestr("SystemStructure.ssd", text)
+            file.write(build.strict2(), "a.fmu")
+        return described(path)
+
+    (component,) = system("three").components
+    assert component.start == {"order": 3.0}
+    with pytest.raises(FmuError, match=r"'a\.order' holds Enumeration; .* give one of one, two, three\."):
+        system("four")

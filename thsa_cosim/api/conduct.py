@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from thsa_cosim.api.finished import Finished, finished, keep_finished
 from thsa_cosim.api.kinds import DiagnoseStudy, IdentifyStudy, SimulateStudy, TuneStudy
 from thsa_cosim.api.study import Study
 from thsa_cosim.errors import ScenarioError
@@ -166,11 +167,16 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Conducted:
-    """A study that was conducted; ``result`` is the kind's own, None of one that was found complete."""
+    """A study that was conducted; ``result`` is the kind's own, None of one that was found complete.
+
+    ``kept``: what a study that was found complete printed when it ended; None of a diagnosis, which is shown from its
+    result.json.
+    """
 
     asked: Asked
     result: Any
     files: tuple[Path, ...]
+    kept: Finished | None = None
 
     @property
     def folder(self) -> Path:
@@ -185,11 +191,16 @@ class Conducted:
     @property
     def objection(self) -> str:
         """Why the result is of no use, or an empty string."""
+        if self.kept is not None:
+            return self.kept.objection
         return "" if self.result is None else self.asked.kind.objection(self.result, self.asked.scenario)
 
     def show(self, out: "Console") -> None:
         """Print what was found."""
-        self.asked.kind.show(out, self.result, self.folder)
+        if self.kept is not None:
+            out.print(self.kept.printed, end="", highlight=False, markup=False, soft_wrap=True)
+        else:
+            self.asked.kind.show(out, self.result, self.folder)
 
     def open(self) -> Study:
         """The study as tables and figures."""
@@ -253,16 +264,22 @@ def conduct(asked: Asked, *, quiet: bool = False) -> Conducted:
         If every simulation failed, or the machine is at fault.
     """
     from thsa_cosim.report.progress import ProgressDisplay, console
+    from thsa_cosim.study import shown_words
 
     kind, folder = asked.kind, asked.place.folder
     if not quiet:
         show_data(asked, console(stderr=True))
-    if kind.name == "diagnose" and _is_complete(asked):
-        return Conducted(asked, None, tuple(path for path in folder.rglob("*") if path.is_file()))
+    if (found := _found_complete(asked)) is not None:
+        if not quiet:
+            sentence = f"{folder} holds this study, complete: it is shown again, and nothing is simulated."
+            console(stderr=True).print(sentence, highlight=False, markup=False, soft_wrap=True)
+        return found
     with ProgressDisplay(console(stderr=True), quiet=quiet) as display:
         result = kind.run(asked.scenario, replace(asked.place, on_progress=display))
-        files = kind.write(result, folder)
-    return Conducted(asked, result, tuple(files))
+        done = Conducted(asked, result, tuple(kind.write(result, folder)))
+        if kind.name != "diagnose" and done.status == "complete":
+            keep_finished(folder, done.show, done.files, done.objection, shown_words(asked.scenario))
+    return done
 
 
 def show_data(asked: Asked, out: "Console") -> None:
@@ -301,17 +318,26 @@ def _slug(title: str) -> str:
     return re.sub(r"\W+", "-", title).strip("-").lower()[:40]
 
 
-def _is_complete(asked: Asked) -> bool:
-    """Whether the folder holds this very study with its result; InputError if it holds another one."""
+def _found_complete(asked: Asked) -> Conducted | None:
+    """What the folder holds of this very study, if that is complete; InputError if it holds another one."""
     from thsa_cosim.report.files import write_json
-    from thsa_cosim.study import claim_folder, study_identity
+    from thsa_cosim.scenario import StagedScenario
+    from thsa_cosim.study import MARKER, claim_folder, shown_words, stages_identity, study_identity
 
-    content = read_result(asked.place.folder)
-    scenario: Any = asked.scenario
-    if content is None or not (asked.place.folder / "study.json").is_file():
-        return False
-    claim_folder(asked.place.folder, study_identity(scenario, asked.kind.name))
+    folder, scenario = asked.place.folder, asked.scenario
+    content = read_result(folder)
+    if content is None or content.get("status") != "complete" or not (folder / MARKER).is_file():
+        return None
+    if isinstance(scenario, StagedScenario):
+        identity = stages_identity(scenario)
+    else:
+        identity = study_identity(scenario, asked.kind.name)
+    claim_folder(folder, identity)
+    if asked.kind.name != "diagnose":
+        kept = finished(folder, shown_words(scenario))
+        return None if kept is None else Conducted(asked, None, kept.files, kept)
+    # All that is shown of a diagnosis is in its result; it takes too long to be run again for a title.
     title = scenario.title or scenario.path.stem
-    if content.get("status") == "complete" and content.get("title", title) != title:
-        write_json(asked.place.folder / RESULT, {**content, "title": title})
-    return content.get("status") == "complete"
+    if content.get("title", title) != title:
+        write_json(folder / RESULT, {**content, "title": title})
+    return Conducted(asked, None, tuple(path for path in folder.rglob("*") if path.is_file()))

@@ -23,7 +23,7 @@ from thsa_cosim.batch.local import LocalRunner
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.runner import OnOutcome, check_experiment, check_jobs, wrapper_names
 from thsa_cosim.closing import Closing
-from thsa_cosim.errors import FmuError, MachineError, MissingExtraError, StudyError
+from thsa_cosim.errors import FmuError, InputError, MachineError, MissingExtraError
 from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.scratch import ScratchFolder
 from thsa_cosim.system import read_description
@@ -72,7 +72,7 @@ class ClusterRunner(Closing):
         ------
         MissingExtraError
             If dask.distributed is not installed.
-        StudyError
+        InputError
             If the scheduler does not answer or has no workers.
         """
         try:
@@ -85,17 +85,29 @@ class ClusterRunner(Closing):
         self._wrapped = wrapper_names(experiments)
         self._parcel = _pack(experiments, options)
         try:
+            # A client of a malformed address would be torn down with a traceback, half a minute later.
+            importlib.import_module("distributed.comm").get_address_host_port(address)
+        except ValueError:
+            raise InputError(
+                f"{address!r} is no address of a Dask scheduler; give its host and port, such as tcp://host:8786."
+            ) from None
+        try:
             self._client = distributed.Client(address, timeout=timeout_s, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             reason = " ".join(str(error).split()).rstrip(".")
-            raise StudyError(f"No Dask scheduler answers at {address} ({reason}).") from None
+            raise InputError(
+                f"No Dask scheduler answers at {address} ({reason}); start it with 'dask scheduler', or correct the"
+                " address."
+            ) from None
         try:
             if not self._client.scheduler_info()["workers"]:
                 self._client.wait_for_workers(1, timeout=timeout_s)
             self._send()
         except TimeoutError:
             self._client.close()
-            raise StudyError(f"The Dask scheduler at {address} has no workers; start some.") from None
+            raise InputError(
+                f"The Dask scheduler at {address} has no workers; start some with 'dask worker {address}'."
+            ) from None
         except BaseException:
             self._client.close()
             raise

@@ -61,10 +61,17 @@ class _Cli(click.Group):
             raise click.UsageError(f"There is no command {args[0]!r}.{hint}", ctx) from error
 
 
-@click.group(cls=_Cli, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(
+    cls=_Cli,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
 @click.version_option(__version__, prog_name="thsa-cosim")
-def cli() -> None:
+@click.pass_context
+def cli(context: click.Context) -> None:
     """Identify, tune and diagnose electromechanical actuators with FMUs and bench recordings."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 for _command in COMMANDS:
@@ -86,6 +93,9 @@ def run_command(arguments: list[str]) -> int:
         return code if isinstance(code, int) else 0
     except click.exceptions.Exit as exit_:
         return exit_.exit_code
+    except click.MissingParameter as error:
+        usage = "" if error.ctx is None else f" Usage: {error.ctx.get_usage().removeprefix('Usage: ')}."
+        return _fail(f"{error.format_message()}{usage}", 2)
     except click.ClickException as error:
         return _fail(error.format_message(), 2)
     except ThsaCosimError as error:

@@ -1,5 +1,6 @@
 """From an attribution to the result: the extended model, identified as the declared one was, and the verdict."""
 
+import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from thsa_cosim.diagnosis.blackbox.prepare import BlackBox
 from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
+from thsa_cosim.diagnosis.catalogue.effect import Effect
 from thsa_cosim.diagnosis.catalogue.extend import write_extended_model
 from thsa_cosim.diagnosis.choosing.attribution import Attribution
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
@@ -238,11 +240,22 @@ class Conclusion:
         if not _tested(self.found):
             yield _untested(self.found, self.effects)
         yield from off_the_drawing(extended.identified.fit)
+        yield from doubts(s.candidate.effect for s in self.found.accepted)
         if extended.model is not None and extended.fmu is not None:
-            yield (
-                f"{extended.fmu.name} is for {native_platform().fmi3} only; thsa-cosim export {extended.model}"
-                f" --package {self.spec.package} -o {extended.fmu} compiles it for all platforms"
-            )
+            again = export_command(extended.model, self.spec.package, extended.fmu)
+            yield f"{extended.fmu.name} is for {native_platform().fmi3} only; {again} compiles it for all platforms"
+
+
+def export_command(model: object, package: object, fmu: object) -> str:
+    """The command that exports ``model`` to ``fmu``, as a shell takes it, whatever is in its paths."""
+    return shlex.join(map(str, ("thsa-cosim", "export", model, "--package", package, "-o", fmu)))
+
+
+def doubts(effects: Iterable[Effect]) -> Iterator[str]:
+    """What the laws of the effects that were found simplify, a sentence of each."""
+    for effect in dict.fromkeys(effects):
+        if effect.doubt:
+            yield f"{effect.name}: {effect.doubt}"
 
 
 def _built(

@@ -237,6 +237,9 @@ def _refresh(graph: Graph, slow: _Slow, symbols: dict[str, str], cached: dict[in
         return []
     assignments = [(cached[node], node) for node in slow.nodes]
     lines = [
+        "#if defined(__GNUC__)",
+        "__attribute__((noinline)) /* so that the test whether it is due can be inlined */",
+        "#endif",
         "static void fill_cache(const double *u, const double *p, const double *d, double *q) {",
         "  (void)u; (void)p; (void)d;",
     ]
@@ -244,12 +247,13 @@ def _refresh(graph: Graph, slow: _Slow, symbols: dict[str, str], cached: dict[in
     lines += [f"  q[{len(slow.nodes) + k}] = u[{index}];" for k, index in enumerate(slow.inputs)]
     lines += ["}", ""]
     if slow.inputs:
-        due = " || ".join(f"q[{len(slow.nodes) + k}] != u[{index}]" for k, index in enumerate(slow.inputs))
+        # one branch instead of one for each input; false where an entry is NaN
+        same = " & ".join(f"(q[{len(slow.nodes) + k}] == u[{index}])" for k, index in enumerate(slow.inputs))
         lines += [
             "/* The cache lies behind the calculated parameters, in memory of the instance that is never const. */",
             "static const double *cache(const double *u, const double *p, const double *d) {",
             "  double *q = (double *)d + N_D;",
-            f"  if ({due}) fill_cache(u, p, d, q);",
+            f"  if (!({same})) fill_cache(u, p, d, q);",
             "  return q;",
             "}",
             "",

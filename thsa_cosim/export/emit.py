@@ -5,7 +5,7 @@ from math import isinf, isnan
 
 import casadi as ca
 
-from thsa_cosim.export.graph import Graph, Place
+from thsa_cosim.export.graph import Graph, Node, Place
 
 _BINARY = {ca.OP_ADD: "{} + {}", ca.OP_SUB: "{} - {}", ca.OP_MUL: "{} * {}", ca.OP_DIV: "{} / {}"}
 _TEXT = {
@@ -71,6 +71,38 @@ class _Writer:
         self.guarded = {place[: depth + 1] for place in self.guard.values() for depth in range(len(place))}
         self.written: set[int] = set()
         self.declared: set[int] = set()
+        self.choices = self._choices(targets)
+        # the branches of choices, and the negations that only they use, are part of the choices' text
+        self.absorbed = {branch for choice in self.choices for branch in graph.nodes[choice].arguments}
+        conditions = {graph.nodes[branch].arguments[0] for branch in self.absorbed}
+        read = {node for choice in self.choices.values() for node in choice}.union(targets)
+        self.absorbed |= {c for c in conditions - read if self.absorbed.issuperset(self.users[c])}
+
+    def _choices(self, targets: list[int]) -> dict[int, tuple[int, int, int]]:
+        """Sums ``(c ? a : 0) + (not c ? b : 0)`` that can be written as ``c ? a : b``: (c, a, b) of each."""
+        found = {}
+        for node in self.order:
+            branches = self.graph.nodes[node].arguments
+            if self.graph.nodes[node].op != ca.OP_ADD or node in self.cached:
+                continue
+            if all(self._serves_alone(branch, node, targets) for branch in branches):
+                (c, a), (opposite, b) = (self.graph.nodes[branch].arguments for branch in branches)
+                if self.graph.nodes[c] == Node(ca.OP_NOT, (opposite,)):
+                    found[node] = (opposite, b, a)
+                elif self.graph.nodes[opposite] == Node(ca.OP_NOT, (c,)):
+                    found[node] = (c, a, b)
+        return found
+
+    def _serves_alone(self, branch: int, total: int, targets: list[int]) -> bool:
+        """Whether ``branch`` is a ``c ? a : 0`` without a block of its own, which only ``total`` uses."""
+        entry = self.graph.nodes[branch]
+        return (
+            entry.op == ca.OP_IF_ELSE_ZERO
+            and branch not in self.cached
+            and branch not in targets
+            and set(self.users[branch]) == {total}
+            and (*self.guard[branch], entry.arguments[0]) not in self.guarded
+        )
 
     def text(self, node: int) -> str:
         """C text of a node's value."""
@@ -88,13 +120,18 @@ class _Writer:
         lines: list[str] = []
         for node in nodes:
             entry = self.graph.nodes[node]
-            if self.guard[node] != place or node in self.written or entry.op is None or node in self.cached:
+            if self.guard[node] != place or node in self.written or entry.op is None:
+                continue
+            if node in self.cached or node in self.absorbed:
                 continue
             self.written.add(node)
             arguments = [self.text(argument) for argument in entry.arguments]
             inner = (*place, entry.arguments[0])
             if entry.op == ca.OP_IF_ELSE_ZERO and inner in self.guarded:
                 lines += self._block(node, inner, arguments, indent)
+            elif node in self.choices:
+                condition, yes, no = (self.text(argument) for argument in self.choices[node])
+                lines.append(f"{indent}{self._target(node)} = {condition} != 0.0 ? {yes} : {no};")
             else:
                 call = _CALLS.get(entry.op)
                 value = f"{call}({', '.join(arguments)})" if call else _TEXT[entry.op].format(*arguments)
@@ -112,7 +149,7 @@ class _Writer:
         inside = {*batch, node}
         for member in batch:
             entry = self.graph.nodes[member]
-            if entry.op is None or member in self.cached or member in self.declared:
+            if entry.op is None or member in self.cached or member in self.declared | self.absorbed:
                 continue
             if not inside.issuperset(self.users[member]):
                 ahead.append(member)

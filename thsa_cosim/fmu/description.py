@@ -72,6 +72,8 @@ class Variable:
     """FMI 1: an alias of the other sign; the FMU sets and gets the variable that it stands for."""
     is_alias: bool = False
     """FMI 3: another name of a variable that has its own entry."""
+    items: tuple[tuple[str, int], ...] = ()
+    """Names and numbers of an enumeration, in the order of its type definition."""
 
     @property
     def is_scalar(self) -> bool:
@@ -388,6 +390,15 @@ def _variable(raw: Any, intermediate: set[int]) -> Variable:
         intermediate_update=int(raw.valueReference) in intermediate,
         initial=raw.initial,
         is_alias=raw.alias is not None,
+        items=_items(declared) if raw.type == "Enumeration" else (),
+    )
+
+
+def _items(declared: Any) -> tuple[tuple[str, int], ...]:
+    """Items of an enumeration's type; those of FMI 1.0 count from 1."""
+    listed = getattr(declared, "items", None) or ()
+    return tuple(
+        (item.name, k if item.value is None else int(item.value)) for k, item in enumerate(listed, 1)
     )
 
 

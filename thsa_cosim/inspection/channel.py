@@ -39,7 +39,8 @@ class Channel:
 
     ``held``: the scenario says that the value stays until the next sample. ``averaged``: only its mean is used.
     ``written`` (n,): the numbers of the file, which a scenario's ``missing`` names; None: ``values``.
-    ``commanded`` (m,): times in s at which a command jumps; what a signal does right after is the machine's answer.
+    ``commanded`` (m,): times in s at which a command jumps, or something is hit; what a signal does right after is the
+    machine's answer. ``shared`` (m,): times in s at which this signal jumps with another quantity, and no motion does.
     """
 
     recording: str
@@ -52,6 +53,7 @@ class Channel:
     averaged: bool = False
     written: FloatArray | None = None
     commanded: FloatArray | None = None
+    shared: FloatArray | None = None
 
     @cached_property
     def jumps(self) -> FloatArray:

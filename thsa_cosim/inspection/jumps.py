@@ -24,6 +24,10 @@ _ALONE = 0.35
 """Change before and after a jump, in jumps."""
 _AROUND, _MANY = 12, 4
 """Samples before and after a wrap that show how the signal moves; so many wraps of one size are no chance."""
+_STAY = 5
+"""Samples on the other side of a border that no spike stays there; hopping on it, one in 32 of the stays is as long."""
+_MOVES_ON = 4.0
+"""σ by which it moves within them."""
 _BURST = 40
 """Samples within which a signal that jumps back was disturbed; after more, it was switched."""
 
@@ -40,6 +44,8 @@ def jumps(channel: Channel) -> Iterator[Finding]:
     at = _jumps(channel, channel.clean, _MOST)
     sizes = channel.clean[at + 1] - channel.clean[at]
     bursts, steps = _paired(channel, at, sizes)
+    if channel.shared is not None:
+        steps = [k for k in steps if not np.isin(channel.time[k + 1], channel.shared)]
     if bursts:
         spans = tuple((float(channel.time[a + 1]), float(channel.time[b])) for a, b in bursts)
         longest = max(b - a for a, b in bursts)
@@ -95,8 +101,18 @@ def wrap_period(channel: Channel, at: NDArray[np.intp]) -> float | None:
     before = np.array([_slope(values[max(0, k - _AROUND) : k + 1]) for k in at])
     after = np.array([_slope(values[k + 1 : k + 2 + _AROUND]) for k in at])
     across = bool(np.all(before * sizes < 0.0) and np.all(after * sizes < 0.0))
+    # At rest it is noise that has a slope, and against a single jump as often as not.
+    moves = np.minimum(np.abs(before), np.abs(after)) * _AROUND > _MOVES_ON * channel.noise
+    across &= sizes.size > 2 or bool(np.all(moves))
     at_ends = np.ptp(np.minimum(values[at], values[at + 1])) < 2.0 * _ALIKE * period
-    return period if at_ends and (across or sizes.size >= _MANY) else None
+    return period if at_ends and (across or (sizes.size >= _MANY and _stays(values))) else None
+
+
+def _stays(values: NDArray[np.float64]) -> bool:
+    """Whether (n,) ``values`` stay in either half of their range for longer than a spike does."""
+    upper = values > 0.5 * (values.max() + values.min())
+    lengths = np.diff(np.concatenate(([0], np.flatnonzero(np.diff(upper)) + 1, [values.size])))
+    return bool(min(lengths[::2].max(), lengths[1::2].max(initial=0)) >= _STAY)
 
 
 def _slope(values: NDArray[np.float64]) -> float:

@@ -1,7 +1,6 @@
 """All detectors over recordings."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -9,7 +8,7 @@ from thsa_cosim.inspection.across import across_findings
 from thsa_cosim.inspection.channel import Channel
 from thsa_cosim.inspection.course import moving_start, temperature_drift, temperature_unit, unequal_noise
 from thsa_cosim.inspection.finding import Finding, Inspection
-from thsa_cosim.inspection.jumps import jump_times, jumps
+from thsa_cosim.inspection.jumps import jumps
 from thsa_cosim.inspection.levels import dead_band, stuck_bit
 from thsa_cosim.inspection.outliers import outliers
 from thsa_cosim.inspection.pairs import pair_findings
@@ -18,6 +17,7 @@ from thsa_cosim.inspection.spectrum import hum
 from thsa_cosim.inspection.stretches import clipped, repeated, stuck
 from thsa_cosim.inspection.time_axis import time_findings
 from thsa_cosim.inspection.time_unit import time_unit
+from thsa_cosim.inspection.witness import with_witnesses
 from thsa_cosim.recordings import Recording
 from thsa_cosim.signals import FloatArray
 
@@ -72,7 +72,7 @@ def inspect_channels(
     for time in times:
         yield from time_findings(recording, time)
     usable = [c for c in channels if c.values.size >= _LEAST and c.plain.min() < c.plain.max()]
-    usable = _with_commands(usable)
+    usable = with_witnesses(usable)
     told: set[tuple[str, str]] = set()
     for channel in usable:
         found = [f for detect in CHANNEL_DETECTORS for f in detect(channel)]
@@ -84,18 +84,6 @@ def inspect_channels(
     yield from (f for f in between if (f.channel, f.kind) not in told)
     if not any((f.channel, f.kind) == ("time", "unit") for f in between):
         yield from time_unit(recording, usable)
-
-
-def _with_commands(channels: Sequence[Channel]) -> list[Channel]:
-    """The channels with the times at which something else jumps, whose answer is no defect."""
-    jumps = {c.name: c.jumps if c.jumps.size else jump_times(c) for c in channels if c.role != "output"}
-    found = []
-    for channel in channels:
-        others = [times for name, times in jumps.items() if name != channel.name or channel.jumps.size]
-        commanded = np.unique(np.concatenate([np.empty(0), *others]))
-        # A copy finds all of its facts anew.
-        found.append(replace(channel, commanded=commanded) if commanded.size else channel)
-    return found
 
 
 def _channel(recording: Recording, name: str, driven: bool) -> Channel:

@@ -17,11 +17,20 @@ LINE_EVERY = 10.0
 BAR_EVERY = 0.1
 
 
+class _Console(Console):
+    """A console that leaves it to the command what becomes of it when its reader has left."""
+
+    def on_broken_pipe(self) -> None:
+        # rich would end the process with exit code 1, although the study is complete.
+        self.quiet = True
+        raise BrokenPipeError
+
+
 def console(*, stderr: bool = False) -> Console:
     """A console for stdout or stderr; in a pipe it is plain and wide."""
-    found = Console(stderr=stderr)
+    found = _Console(stderr=stderr)
     # A pipe has no width; 80 columns would fold every table.
-    return found if found.is_terminal else Console(stderr=stderr, width=140)
+    return found if found.is_terminal else _Console(stderr=stderr, width=140)
 
 
 class ProgressDisplay:
@@ -38,6 +47,7 @@ class ProgressDisplay:
         self._start = self._begin = time.monotonic()
         self._shown = self._begin
         self._last: Progress | None = None
+        self._said = ""
 
     def __enter__(self) -> Self:
         if not self._quiet and self._console.is_terminal:
@@ -84,6 +94,9 @@ class ProgressDisplay:
             )
 
     def _step(self, step: str) -> None:
+        if step == self._said and self._bar is None:
+            return  # a line more says nothing new
+        self._said = step
         text = f"{time.monotonic() - self._start:6.1f} s  {step}"
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, description=text, state="")

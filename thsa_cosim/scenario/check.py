@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from thsa_cosim.errors import ParameterError, ScenarioError, UnitError, did_you_mean, did_you_mean_path
+from thsa_cosim.errors import ParameterError, ScenarioError, did_you_mean, did_you_mean_path
 from thsa_cosim.fmu import FmuDescription, Variable
 from thsa_cosim.parameters import Parameter, ParameterSpace
 from thsa_cosim.scenario.diagnose_schema import DiagnoseOptionsTable
@@ -21,8 +21,6 @@ from thsa_cosim.scenario.schema import (
 from thsa_cosim.scenario.table import FileTable
 from thsa_cosim.scenario.tune_schema import TuneTable
 from thsa_cosim.shipped import modelica_package
-from thsa_cosim.ssv import read_ssv
-from thsa_cosim.units import convert
 
 _SETTABLE = ("parameter", "structuralParameter")
 
@@ -261,8 +259,23 @@ def settable(fmu: FmuDescription, name: str, key: str) -> Variable:
     )
 
 
+def takes_text(fmu: FmuDescription, name: str) -> bool:
+    """Whether a variable gets a text as its start value: a String parameter, or input, as a text has no course."""
+    variable = fmu.variables.get(name)
+    return variable is not None and variable.type == "String" and not variable.is_array
+
+
 def check_range(variable: Variable, value: float, key: str, fmu: FmuDescription) -> None:
     """ParameterError if the FMU does not allow ``value`` (in its unit) for a variable."""
+    if not variable.is_float and not (
+        value in (0.0, 1.0) if variable.type == "Boolean" else value.is_integer()
+    ):
+        wanted = "true or false" if variable.type == "Boolean" else "a whole number"
+        names = ", ".join(f"{number} ({item})" for item, number in variable.items[:8])
+        raise ParameterError(
+            f"{key}: {value:g} is not {wanted}; {variable.name!r} of {fmu.path.name} is of type {variable.type}"
+            f"{': ' + names if names else ''}."
+        )
     below = variable.minimum is not None and value < variable.minimum - 1e-12 * abs(variable.minimum)
     above = variable.maximum is not None and value > variable.maximum + 1e-12 * abs(variable.maximum)
     if below or above:
@@ -274,16 +287,19 @@ def check_range(variable: Variable, value: float, key: str, fmu: FmuDescription)
 
 
 def fixed(
-    path: Path, table: CommonTable | TuneTable, fmu: FmuDescription, space: ParameterSpace
+    path: Path,
+    table: CommonTable | TuneTable,
+    fmu: FmuDescription,
+    space: ParameterSpace,
+    values: Mapping[str, float],
 ) -> dict[str, float]:
-    """Return FMU start values: the parameter set's, overridden by zeroed coefficients, then by ``[fixed]``.
+    """Return FMU start values: ``values`` of the parameter set, overridden by zeroed coefficients, then by ``[fixed]``.
 
     Raises
     ------
     ScenarioError, ParameterError, UnitError
         If a variable is no parameter, a glob matches none, or a value is searched for as well.
     """
-    values = _parameter_set(path, table, fmu)
     searched = {p.variable: p.name for p in space.parameters}
     own: dict[str, float] = {}
     for name, value in table.fixed.items():
@@ -311,11 +327,10 @@ def fixed(
 
 def _start_value(fmu: FmuDescription, name: str, value: float | str | FileTable, key: str) -> Variable:
     """Return the variable that ``[fixed]`` gives a start value of its type; ScenarioError otherwise."""
-    known = fmu.variables.get(name)
-    is_text = known is not None and known.type == "String" and not known.is_array
+    is_text = takes_text(fmu, name)
     given = isinstance(value, str | FileTable)
-    if known is not None and is_text and known.causality == "input" and given:
-        return known  # a text has no course over time: it is given like a parameter
+    if is_text and given and fmu.variables[name].causality == "input":
+        return fmu.variables[name]  # a text has no course over time: it is given like a parameter
     variable = settable(fmu, name, key)
     if given and not is_text:
         shown = value if isinstance(value, str) else value.file  # type: ignore[union-attr]
@@ -370,24 +385,6 @@ def _zeroed(fmu: FmuDescription, parameter: ParameterTable) -> list[str]:
             )
         names += inside
     return [n for n in names if n != parameter.variable]
-
-
-def _parameter_set(path: Path, table: CommonTable | TuneTable, fmu: FmuDescription) -> dict[str, float]:
-    if table.parameter_set is None:
-        return {}
-    file = path.parent / table.parameter_set
-    given = read_ssv(file)
-    values: Mapping[str, float] = given.values
-    result = {}
-    for name, value in values.items():
-        variable = settable(fmu, name, f"parameter_set ({file.name})")
-        try:
-            unit = given.units.get(name)
-            result[name] = convert(value, unit, variable.unit) if unit and variable.unit else value
-        except UnitError as error:
-            raise UnitError(f"{file}: {name!r}: {error}") from None
-        check_range(variable, result[name], f"parameter_set ({file.name})", fmu)
-    return result
 
 
 def _quoted(name: str) -> str:

@@ -12,6 +12,7 @@ from thsa_cosim.scenario import check
 from thsa_cosim.scenario.files import expand, named
 from thsa_cosim.scenario.law_search import with_laws
 from thsa_cosim.scenario.model import Scenario, TemperaturePoint
+from thsa_cosim.scenario.parameter_set import with_parameter_set
 from thsa_cosim.scenario.recording_schema import TemperatureTable
 from thsa_cosim.scenario.schema import (
     ChannelTable,
@@ -36,11 +37,12 @@ def resolve_recorded(
 ) -> Scenario:
     """Return the scenario of ``table``; arguments and errors as of ``load``."""
     description = open_model(path, table, fmu)
+    given, table = with_parameter_set(path, table, description)
     inputs, measured = check.roles(table, description)
     started = check.started(table, description)
     parameters = check.parameters(table, description) if isinstance(table, IdentifyTable) else ()
     space = ParameterSpace(tuple(p for p, _ in parameters))
-    fixed = check.fixed(path, table, description, space)
+    fixed = check.fixed(path, table, description, space, given)
     outputs = check.outputs(table, description, measured)
     cost = _cost(table, measured, inputs)
     files = {

@@ -262,10 +262,12 @@ class CommonTable(ModelTable):
     recordings: RecordingsTable
     temperature: TemperatureTable | None = None
     parameter_set: Name | None = None
-    """Path of an SSV file with start values, for example the ``identified.ssv`` of a study."""
+    """Path of an SSV file with start values, for example the ``identified.ssv`` of a study. Numbers, Booleans, texts
+    (``String``) and items of enumerations by name are read; arrays and binaries are refused."""
     fixed: dict[Name, StartValue] = Field(default_factory=dict)
     """Start values held in every run, by FMU variable, in the FMU's units; they win over ``parameter_set``. A String
     variable, be it a parameter or an input, gets a text in quotes, or the path of a file as ``{ file = "table.txt" }``.
+    An enumeration gets the number of its item.
     """
     cost: CostTable = CostTable()
     simulation: SimulationTable = SimulationTable()

@@ -41,13 +41,15 @@ def _plain(value: Any) -> Any:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the file's tables; ScenarioError if it is missing or no TOML."""
+    if path.is_dir():
+        raise ScenarioError(one_line(f"{path}: is a folder; name a scenario file (.toml){_in_folder(path)}."))
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
         near = did_you_mean_path(path)
         raise ScenarioError(one_line(f"{path}: no such scenario file; check the path.{near}")) from None
     except UnicodeDecodeError:
-        raise ScenarioError(one_line(f"{path}: is not UTF-8 text; save it as UTF-8.")) from None
+        raise ScenarioError(one_line(f"{path}: is {_no_text(path)}")) from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise ScenarioError(one_line(f"{path}: cannot be read ({reason}).")) from None
@@ -55,6 +57,21 @@ def read_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         raise ScenarioError(one_line(f"{path}: is no valid TOML ({error}); correct it.")) from None
+
+
+def _in_folder(folder: Path) -> str:
+    """``, such as folder/motor.toml``, if the folder holds one."""
+    found = min(folder.glob("*.toml"), default=None)
+    return "" if found is None else f", such as {found}"
+
+
+def _no_text(path: Path) -> str:
+    """What a file that is no UTF-8 text is, and what to do about it."""
+    if path.suffix.lower() == ".toml":
+        return "not UTF-8 text; save it as UTF-8."
+    model = path.suffix.lower() in (".fmu", ".ssp")
+    what, arguments = ("a model", f"{path} RECORDING") if model else ("no text", f"MODEL.fmu {path}")
+    return f"{what}, no scenario file (.toml); 'thsa-cosim init {arguments}' writes one."
 
 
 def about_kind(data: Mapping[str, Any], known: Iterable[str]) -> tuple[str, str]:

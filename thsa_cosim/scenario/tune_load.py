@@ -19,6 +19,7 @@ from thsa_cosim.scenario.metrics_schema import (
     RequirementTable,
     StartTable,
 )
+from thsa_cosim.scenario.parameter_set import with_parameter_set
 from thsa_cosim.scenario.schema import SearchTable
 from thsa_cosim.scenario.system import open_model
 from thsa_cosim.scenario.tune_drawn import checked_line, checked_pareto, checked_surface
@@ -46,13 +47,14 @@ def resolve_tune(
 ) -> TuneScenario:
     """Return the scenario of ``table``; arguments (``model`` is ``fmu``) and errors as of ``load``."""
     fmu = open_model(path, table, model)
+    given, table = with_parameter_set(path, table, fmu)
     profiles = _profiles(table, fmu, read_profiles(path, table, fmu))
     command = profiles[0].command if profiles else _command(table, fmu)
     axes = tuple(_axis(name, axis, fmu, f"conditions.{name}") for name, axis in table.conditions.items())
     _all_driven(table, fmu, command, axes)
     axes += profile_axis(len(profiles))
     space = ParameterSpace(tuple(_gain(table, k, fmu) for k in range(len(table.parameters))))
-    fixed = check.fixed(path, table, fmu, space)
+    fixed = check.fixed(path, table, fmu, space, given)
     for name in table.conditions:
         if name in fixed or name in [p.variable for p in space.parameters]:
             raise ScenarioError(f"conditions.{name} is set in [fixed] or tuned as well; remove one of them.")

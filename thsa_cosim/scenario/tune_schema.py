@@ -237,6 +237,7 @@ class TuneTable(ModelTable):
     fixed: dict[Name, StartValue] = Field(default_factory=dict)
     """Start values held in every run, by FMU variable, in the FMU's units; they win over ``parameter_set``. A String
     variable, be it a parameter or an input, gets a text in quotes, or the path of a file as ``{ file = "table.txt" }``.
+    An enumeration gets the number of its item.
     """
     command: CommandTable
     conditions: dict[Name, ConditionTable] = Field(default_factory=dict)

@@ -25,11 +25,11 @@ from thsa_cosim.study.comparison import (
     summarise,
 )
 from thsa_cosim.study.coupling import CouplingError, coupling_error
-from thsa_cosim.study.digest import digest_of_folder, digest_of_recording, digest_of_text
+from thsa_cosim.study.digest import digest_of_file, digest_of_folder, digest_of_recording, digest_of_text
 from thsa_cosim.study.engine import Engine, Problem, Reply, Request, Want, stacked
 from thsa_cosim.study.exported import export_digest, is_made_from, note_made_from
 from thsa_cosim.study.folder import MARKER, claim_folder, describe
-from thsa_cosim.study.identity import stages_identity, study_identity
+from thsa_cosim.study.identity import shown_words, stages_identity, study_identity
 from thsa_cosim.study.interleave import interleave
 from thsa_cosim.study.place import OnProgress, Place, Progress
 from thsa_cosim.study.study import Study
@@ -57,6 +57,7 @@ __all__ = [
     "compare_case",
     "coupling_error",
     "describe",
+    "digest_of_file",
     "digest_of_folder",
     "digest_of_recording",
     "digest_of_text",
@@ -65,6 +66,7 @@ __all__ = [
     "is_made_from",
     "note_made_from",
     "reached",
+    "shown_words",
     "stacked",
     "stages_identity",
     "study_identity",

@@ -1,6 +1,5 @@
 """FMUs that are kept in a study folder: beside each one a note of what it was made from."""
 
-import hashlib
 import json
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -8,7 +7,7 @@ from pathlib import Path
 
 import thsa_cosim
 from thsa_cosim import __version__
-from thsa_cosim.study.digest import digest_of_folder, digest_of_text
+from thsa_cosim.study.digest import digest_of_file, digest_of_folder, digest_of_text
 from thsa_cosim.study.identity import MODELICA
 
 #: Packages that have a part in an export.
@@ -37,7 +36,7 @@ def is_made_from(fmu: Path, digest: str) -> bool:
     """Whether ``fmu`` is there as it was written, and was made from what ``digest`` stands for."""
     try:
         note = json.loads(_note(fmu).read_text(encoding="utf-8"))
-        return bool(note == {"made from": digest, "sha256": _sha256(fmu)})
+        return bool(note == {"made from": digest, "sha256": digest_of_file(fmu)})
     except (OSError, ValueError):
         return False
 
@@ -45,13 +44,11 @@ def is_made_from(fmu: Path, digest: str) -> bool:
 def note_made_from(fmu: Path, digest: str) -> None:
     """Keep beside ``fmu`` what it was made from."""
     partial = _note(fmu).with_suffix(".part")
-    partial.write_text(json.dumps({"made from": digest, "sha256": _sha256(fmu)}) + "\n", encoding="utf-8")
+    partial.write_text(
+        json.dumps({"made from": digest, "sha256": digest_of_file(fmu)}) + "\n", encoding="utf-8"
+    )
     partial.replace(_note(fmu))
 
 
 def _note(fmu: Path) -> Path:
     return fmu.with_suffix(".made-from.json")
-
-
-def _sha256(file: Path) -> str:
-    return hashlib.sha256(file.read_bytes()).hexdigest()

@@ -5,7 +5,7 @@ key that is added to the schema is part of it without a line here. What is left 
 ``SHOWN_ONLY`` and ``BY_CONTENT``.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 
 from thsa_cosim import __version__
 from thsa_cosim.recordings import Recording
-from thsa_cosim.scenario import Scenario, StagedScenario, Table, TuneScenario
+from thsa_cosim.scenario import AnyScenario, Scenario, StagedScenario, Table, TuneScenario
 from thsa_cosim.scenario.table import FileTable
 from thsa_cosim.study.digest import digest_of_file, digest_of_folder, digest_of_recording, digest_of_text
 
@@ -86,41 +86,56 @@ def stages_identity(staged: StagedScenario) -> Identity:
     return asked | _versions()
 
 
-def flatten(table: Table) -> Identity:
+def shown_words(scenario: AnyScenario) -> Identity:
+    """What ``scenario`` gives of ``SHOWN_ONLY``, key by key: the same study under other words is written anew."""
+    if isinstance(scenario, StagedScenario):
+        stages = {
+            f"stages[{stage.name}].{key}": words
+            for stage in scenario.stages
+            for key, words in shown_words(stage.scenario).items()
+        }
+        return {"title": scenario.title, **stages}
+    counted = flatten(scenario.table)
+    return {key: words for key, words in flatten(scenario.table, BY_CONTENT).items() if key not in counted}
+
+
+def flatten(table: Table, left_out: Collection[str] = (*SHOWN_ONLY, *BY_CONTENT)) -> Identity:
     """A validated table as dotted keys, as they stand in the file; defaults are filled in."""
-    return dict(_flat(table, "", ()))
+    return dict(_flat(table, "", (), left_out))
 
 
-def _flat(value: Any, key: str, path: tuple[str, ...]) -> Iterable[tuple[str, Any]]:
+def _flat(
+    value: Any, key: str, path: tuple[str, ...], left_out: Collection[str]
+) -> Iterable[tuple[str, Any]]:
     """``path``: names of the schema's keys alone, without those that a user chose (of a signal, say)."""
-    schema_key = ".".join(path)
-    if value is None or schema_key in SHOWN_ONLY or schema_key in BY_CONTENT:
+    if value is None or ".".join(path) in left_out:
         return
     if isinstance(value, Table):
         inside = [
             item
             for name, field in type(value).model_fields.items()
             for item in _flat(
-                getattr(value, name), _join(key, field.alias or name), (*path, field.alias or name)
+                getattr(value, name), _join(key, field.alias or name), (*path, field.alias or name), left_out
             )
         ]
         yield from inside or [(key, {})]  # a table may mean something by being there
     elif isinstance(value, Mapping):
-        yield from _members(key, path, [(f"{key}.{name}", name, member) for name, member in value.items()])
+        members = [(f"{key}.{name}", name, member) for name, member in value.items()]
+        yield from _members(key, path, members, left_out)
     elif isinstance(value, Sequence) and value and isinstance(value[0], Table):
         names = [str(getattr(member, "name", number)) for number, member in enumerate(value, start=1)]
         members = [(f"{key}[{name}]", name, member) for name, member in zip(names, value, strict=True)]
-        yield from _members(key, path, members)
+        yield from _members(key, path, members, left_out)
     else:
         yield key, _plain(value)
 
 
 def _members(
-    key: str, path: tuple[str, ...], members: Sequence[tuple[str, str, Any]]
+    key: str, path: tuple[str, ...], members: Sequence[tuple[str, str, Any]], left_out: Collection[str]
 ) -> Iterable[tuple[str, Any]]:
     """Named members, and their order where there are several: terms, vectors and conditions follow it."""
     for own, _, member in members:
-        yield from _flat(member, own, path)
+        yield from _flat(member, own, path, left_out)
     if len(members) > 1:
         yield f"{key} (order)", [name for _, name, _ in members]
 

@@ -4,9 +4,11 @@ The file holds one record per run: a frame (length and checksum), the run's key,
 of all that decides the outcome: the FMU's archive, inputs, times, start values, solver settings, and what the worker
 makes of the signals. A kill tears the last record at most, which is dropped when the log is opened again.
 
-Outcomes are kept as far as the disk has room, see ``LARGEST`` and ``SHARE``: to write the residuals of a run takes a
-hundredth of simulating it. A diagnosis of a few long recordings comes to 0.3 to 1 GB; all of it goes when the study is
-complete. Timing apart, a recalled outcome is bit for bit the one that was returned.
+Outcomes are kept up to ``LARGEST`` bytes and as far as the disk has room (``SHARE``): to write the residuals of a run
+takes a hundredth of simulating it. A diagnosis of a few long recordings comes to 0.3 to 1.5 GB, one that searches for
+an empirical law to more (3.4 GB were seen, residuals of 0.7 MB a run); it goes when the study is complete. The first
+runs are those that are kept: a continued study asks for them first. Timing apart, a recalled outcome is bit for bit the
+one that was returned.
 """
 
 import contextlib
@@ -17,7 +19,7 @@ import pickle
 import shutil
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -31,7 +33,7 @@ from thsa_cosim.signals import Signals
 
 RUNS = "runs.log"
 #: So many bytes may be kept at most, and this share of what the disk has left when the study is opened.
-LARGEST, SHARE = 4_000_000_000, 0.25
+LARGEST, SHARE = 2_000_000_000, 0.25
 #: Outcomes up to this size (cost terms, say) are always kept.
 SMALL = 2_000
 _MAGIC = b"thsa-cosim runs 1\n"
@@ -42,23 +44,29 @@ _KEY = 16
 class RunLog(Closing):
     """Outcomes by key, in a file that only grows; a context manager."""
 
-    def __init__(self, path: Path, file: BinaryIO) -> None:
+    def __init__(self, path: Path, file: BinaryIO, say: Callable[[str], None] = lambda _: None) -> None:
         """``RunLog.open`` is the way in."""
         self.path = path
+        self._say = say
         self.recalled = 0
         """Outcomes that were looked up."""
+        self.left_out = 0
+        """Large outcomes for which there was no room."""
         self._file = file
         self._at: dict[bytes, tuple[int, int]] = {}
         self._end = 0
         self._allowed = LARGEST
 
     @classmethod
-    def open(cls, path: Path) -> "RunLog":
-        """Open or create the log; InputError if another run uses it, or it is no log."""
+    def open(cls, path: Path, say: Callable[[str], None] = lambda _: None) -> "RunLog":
+        """Open or create the log; InputError if another run uses it, or it is no log.
+
+        ``say`` is told once that it is full.
+        """
         file = path.open("a+b", buffering=0)
         try:
             _lock(path, file)
-            log = cls(path, file)
+            log = cls(path, file, say)
             log._load()
             log._allowed = min(LARGEST, log._end + int(SHARE * shutil.disk_usage(path.parent).free))
         except BaseException:
@@ -85,7 +93,10 @@ class RunLog(Closing):
         if outcome.status is Status.MACHINE:
             return
         size = sum(a.nbytes for a in _arrays(outcome))
-        if key in self._at or (size > SMALL and self._end + size > self._allowed):
+        if key in self._at:
+            return
+        if size > SMALL and self._end + size > self._allowed:
+            self._cut()
             return
         content = _encoded(outcome)
         checksum, length = zlib.crc32(key), sum(len(piece) for piece in content)
@@ -105,6 +116,15 @@ class RunLog(Closing):
             ) from None
         self._end = begin + len(head) + length
         self._at[key] = (self._end - length, length)
+
+    def _cut(self) -> None:
+        """Count an outcome that is left out; of the first one say it."""
+        self.left_out += 1
+        if self.left_out == 1:
+            self._say(
+                f"{self.path.name} is full at {self._end / 1e6:.0f} MB; further runs are not kept, and are simulated"
+                " again where the study is interrupted and continued"
+            )
 
     def remove(self) -> None:
         """Remove the file: the study is complete."""

@@ -34,7 +34,7 @@ class Study:
             If the folder belongs to another study or to another run, or cannot be used.
         """
         claim_folder(place.folder, identity, {**about, "command": place.command} if place.command else about)
-        return cls(place, RunLog.open(place.folder / RUNS))
+        return cls(place, RunLog.open(place.folder / RUNS, place.say))
 
     @property
     def folder(self) -> Path:

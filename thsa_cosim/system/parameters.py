@@ -36,6 +36,8 @@ class Binding:
     """What messages call it."""
     others: Mapping[str, str] = field(default_factory=dict)
     """Types of the values that are no numbers (String, Enumeration, Binary), by name."""
+    texts: Mapping[str, str] = field(default_factory=dict)
+    """Values of those that are a String or the name of an item of an Enumeration."""
 
     def entries(self) -> Iterator["Entry"]:
         """Yield what the binding gives, with targets as seen from its element."""
@@ -72,14 +74,25 @@ class Entry:
     is_mapped: bool
     binding: Binding
 
-    def number(self, target: str, unit: str | None, definitions: UnitDefinitions) -> float:
-        """The value in ``unit``; FmuError if it is no number or does not convert."""
-        if self.value is None:
-            kind = self.binding.others[self.mapped.source]
-            raise FmuError(
-                f"{self.binding.source}: {self.target!r} holds {kind}; only numbers can be set, so leave it out."
-            )
+    def number(
+        self,
+        target: str,
+        unit: str | None,
+        definitions: UnitDefinitions,
+        items: Mapping[str, int] | None = None,
+    ) -> float:
+        """The value in ``unit``; FmuError if it is no number or does not convert. ``items``: of an enumeration."""
         value = self.value
+        if value is None and items:
+            value = items.get(self.binding.texts.get(self.mapped.source, ""))
+        if value is None:
+            kind = self.binding.others[self.mapped.source]
+            remedy = f"give one of {', '.join(items)}" if items else "so leave it out"
+            if kind == "String":
+                remedy += "; a text goes into [fixed] of the scenario"
+            raise FmuError(
+                f"{self.binding.source}: {self.target!r} holds {kind}; only numbers can be set, {remedy}."
+            )
         if self.unit and unit and unit != self.unit:
             try:
                 factor, offset = definitions.conversion(self.unit, unit)
@@ -110,8 +123,8 @@ class Placement:
             name = f"{path}.{entry.target}" if path else entry.target
             if (pin := self._component_variable(name)) is not None:
                 component, variable = pin
-                unit = self._fmus[component].variable(variable).unit
-                value = entry.number(variable, unit, self._definitions)
+                found = self._fmus[component].variable(variable)
+                value = entry.number(variable, found.unit, self._definitions, dict(found.items))
                 self.starts.setdefault(component, {})[variable] = value
             elif (connector := self._connector(name)) is not None:
                 unit = self._connectors[connector]

@@ -340,6 +340,7 @@ def _bindings(path: Path, archive: zipfile.ZipFile, element: ET.Element, member:
                 mapping,
                 inside,
                 parameters.others,
+                parameters.texts,
             )
         )
     return tuple(found)

@@ -102,7 +102,7 @@ def found() -> Any:
     refined = [scored(winner), scored(rival), scored(worse)]
     own = one_round(
         [winner, rival, worse, proposal("a", 50.0, start=1.0), less, chance, blind, deaf],
-        refined, refined[0], ("",), (refined[1],),
+        refined, refined[0], ("",), (scored(rival, 95.0),),
     )  # fmt: skip
     return attribution(own, accepted=(refined[0],))
 
@@ -116,14 +116,14 @@ def test_every_candidate_is_judged_once_the_accepted_one_first_then_what_was_ref
     assert [j.reason for j in made] == [
         "",
         "explains the held-out recordings as well, within the uncertainty",
-        "explains the held-out recordings less well",
+        "explains the held-out recordings less well than a:motor",
         "promises less than those that were refined",
         "promises no more than chance",
         "too little excitation beside the declared parameters",
         "nothing in the fit recordings depends on it",
     ]
     assert {j.round for j in made} == {1}
-    assert [j.held_out_gain for j in made] == [90.0, 90.0, 90.0, None, None, None, None]
+    assert [j.held_out_gain for j in made] == [90.0, 95.0, 90.0, None, None, None, None]
     assert made[0].variant == "a:motor/x0 (v_S = 0)"
 
 
@@ -191,7 +191,9 @@ def test_what_was_accepted_and_dropped_again_or_accepted_later_is_said_to_be():
     alone = {(j.name[0], j.round): j for j in judged(attribution(plain, later, accepted=(again,)))}
     assert alone["b", 1].reason == "explains the held-out recordings less well; accepted in round 2"
     dropped = {(j.name[0], j.round): j for j in judged(attribution(plain, later, accepted=(one,)))}
-    assert dropped["b", 1].reason == "explains the held-out recordings less well", "not accepted after all"
+    assert dropped["b", 1].reason == "explains the held-out recordings less well than a:motor", (
+        "not accepted after all"
+    )
 
 
 def test_an_effect_is_as_probable_as_chance_and_its_rivals_leave_it(found: Any):
@@ -239,6 +241,7 @@ def test_a_value_at_its_bound_unseen_or_only_known_from_the_drawing_is_not_deter
     assert undetermined(own, 1.0, 0.1) == ""
     assert undetermined(own, 2.0, 7e-7) == "it ended at the end of its range, 2 N"
     assert undetermined(own, -9.0, 7e-7) == "it ended at the end of its range, -9 N"
+    assert undetermined(replace(own, unit="1"), 2.0, 7e-7) == "it ended at the end of its range, 2"
     assert undetermined(own, 1.0, np.inf) == "nothing in the recordings depends on it"
     assert undetermined(own, 1.0, 0.47) == ""
     assert undetermined(own, 1.0, NO_MORE * 0.5) == ""

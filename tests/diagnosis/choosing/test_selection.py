@@ -1,13 +1,18 @@
 """What is refined, what counts as another place, and which rivals these recordings cannot tell from the winner."""
 
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
+from thsa_cosim.diagnosis.catalogue.known import known_effects
+from thsa_cosim.diagnosis.catalogue.slots import Slot
 from thsa_cosim.diagnosis.choosing import selection as room
 from thsa_cosim.diagnosis.choosing.selection import Selection, other_places, other_waves, worth_refining
+from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns, unknowns_of
 
 
 def proposal(effect: str, gain: float, place: str = "motor") -> Any:
@@ -308,3 +313,83 @@ def test_places_that_were_not_refined_are_fitted_for_the_comparison(
     assert names(tuple(found)) == ["a:gear"]
     assert tried == ["a:gear", "a:nut"]
     assert selection.elsewhere(winner, [winner, *found], proposals[:2]) == []
+
+
+MOTOR = Slot("motor", "FrictionEffect", {"v": "rad/s", "z": "rad", "N": "N.m", "F": "N.m"})
+GEARBOX = replace(MOTOR, name="gearbox")
+NUT = Slot("screw", "FrictionEffect", {"v": "m/s", "z": "m", "N": "N", "F": "N"})
+SCALES = {
+    "motor": {"V": 300.0, "Z": 600.0, "D": 1e3, "F": 5.0},
+    "gearbox": {
+        "V": 10.0,
+        "Z": 20.0,
+        "D": 1e3 / 30.0,
+        "F": 120.0,
+    },  # more than 30 times: the gear's own friction
+    "screw": {"V": 0.016, "Z": 0.03, "D": 0.05, "F": 5e4},
+}
+J = Unknown("J", "motor.J", "kg.m2", 2e-3, 1e-4, 1e-4, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class _Vector:
+    unknowns: Unknowns
+    vector: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    candidate: Any
+    fit: _Vector
+
+
+def fitted_at(effect: str, slot: Slot, number: int, **values: float) -> Any:
+    """An effect at a place with its parameters at ``values``, beside J."""
+    made = candidates_of([known_effects()[effect]], [MOTOR, GEARBOX, NUT], SCALES)
+    candidate = next(c for c in made if c.slot.name == slot.name and c.number == number)
+    unknowns = Unknowns((J, *unknowns_of(candidate, {p.name: p.at_start for p in candidate.parameters})))
+    named = {f"{candidate.slot.component}.{candidate.component}.{k}": v for k, v in values.items()}
+    vector = np.array([named.get(u.name, u.start) for u in unknowns.members])
+    vector[0] = values.get("J", J.start)
+    return _Fitted(candidate, _Vector(unknowns, vector))
+
+
+def test_behind_a_gear_the_same_law_has_another_speed_and_the_torque_that_makes_the_same_power():
+    winner = fitted_at("stribeck", GEARBOX, 0, dF=6.0, v_S=0.2, n=2.0, J=2.1e-3)
+    other = fitted_at("stribeck", MOTOR, 0, dF=0.01, v_S=60.0, n=1.5)
+    found: Any = room.geared(winner, other)  # type: ignore[arg-type]
+    assert found.candidate is other.candidate
+    assert found.fit.unknowns.named(found.fit.vector) == pytest.approx(
+        {
+            "J": 2.1e-3,
+            "motorEffect.stribeck.dF": 0.2,
+            "motorEffect.stribeck.v_S": 6.0,
+            "motorEffect.stribeck.n": 2.0,
+        }
+    )
+    back: Any = room.geared(found, winner)  # type: ignore[arg-type]
+    assert back.fit.vector == pytest.approx(winner.fit.vector)
+
+
+def test_only_another_shaft_with_the_same_form_of_a_law_over_speed_or_angle_is_geared():
+    winner = fitted_at("stribeck", GEARBOX, 0, dF=6.0, v_S=0.2)
+    for other in (
+        fitted_at("stribeck", GEARBOX, 0),
+        fitted_at("stribeck", MOTOR, 1),
+        fitted_at("stribeck", NUT, 0),
+        fitted_at("friction-run-in", MOTOR, 0),
+    ):
+        assert room.geared(winner, other) is None  # type: ignore[arg-type]
+    linear = fitted_at("asymmetric-friction", GEARBOX, 0), fitted_at("asymmetric-friction", MOTOR, 0)
+    assert room.geared(*linear) is None  # type: ignore[arg-type]
+
+
+def test_another_shaft_whose_fit_did_not_find_its_way_starts_from_the_winner_to_be_compared(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    winner, lost, foreign = scored("a", 0.0), scored("a", 0.5, "gear"), scored("b", 0.5)
+    monkeypatch.setattr(room, "geared", lambda one, other: other if other is lost else None)
+    monkeypatch.setattr(
+        room, "polish", lambda bench, one, current, held: scored("a", 0.0, "gear") if one is lost else one
+    )
+    assert names(selection.rivals(winner, [winner, lost, foreign], ())) == ["a:gear"]

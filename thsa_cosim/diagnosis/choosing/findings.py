@@ -41,7 +41,8 @@ def values_of(fit: Fit, *, declared: bool, stderr: FloatArray | None = None) -> 
 def undetermined(unknown: Unknown, value: float, stderr: float) -> str:
     """Why the recordings do not determine an unknown, or ""; how large an effect's parameter is says `vague`."""
     if not unknown.lower < value < unknown.upper:
-        return f"it ended at the end of its range, {value:.6g} {unknown.unit}"
+        unit = "" if unknown.unit in ("", "1") else f" {unknown.unit}"
+        return f"it ended at the end of its range, {value:.6g}{unit}"
     if not np.isfinite(stderr):
         return "nothing in the recordings depends on it"
     if unknown.declared and stderr > NO_MORE * unknown.spread:
@@ -190,7 +191,8 @@ def judged(found: Attribution) -> tuple[Judged, ...]:
     for number, one in enumerate(found.rounds, start=1):
         kept = one.accepted is not None and one.accepted in found.accepted
         rivals = {r.candidate.key for r in one.rivals} if kept else set()
-        refined = {id(s.proposal): s for s in one.scored}
+        # Of a rival the fit that makes it one, with all parameters.
+        refined = {id(s.proposal): s for s in (*one.scored, *one.rivals)}
         seen: set[str] = set()
         winner = None if one.accepted is None else one.accepted.proposal
         ordered = sorted(one.proposals, key=lambda p: (p is not winner, id(p) not in refined, -p.gain))
@@ -252,7 +254,9 @@ def _objection(found: Attribution, one: Round, scored: Scored) -> str:
     later = _accepted_later(found, one, scored)
     if later:
         return later
-    return "explains the held-out recordings less well" if one.accepted else one.objections[0]
+    if one.accepted is None:
+        return one.objections[0]
+    return f"explains the held-out recordings less well than {one.accepted.candidate.name}"
 
 
 def _accepted_later(found: Attribution, one: Round, scored: Scored) -> str:

@@ -1,7 +1,9 @@
 """One round of the search: what to refine, which of it to accept, and what these recordings cannot tell from that."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from thsa_cosim.diagnosis.choosing.gates import (
     SIGMAS,
@@ -74,6 +76,37 @@ def other_places(winner: Proposal, proposals: Sequence[Proposal]) -> list[Propos
         if same and proposal.gain >= RIVAL_WORTH * winner.gain:
             found.setdefault(name, proposal)
     return list(found.values())
+
+
+def geared(winner: Scored, other: Scored) -> Scored | None:
+    """``other`` at the optimum of ``winner``, the same form of its effect on another shaft that turns at a ratio.
+
+    Speeds and angles grow by the ratio, torques fall by it. None if the form has no speed or angle of its own (then the
+    fit is nearly linear and finds its way), or one of the two is no shaft.
+    """
+    one, two = winner.candidate, other.candidate
+    same = one.effect.name == two.effect.name and one.number == two.number and one.component == two.component
+    if not same or one.slot.name == two.slot.name or not (one.slot.is_angular and two.slot.is_angular):
+        return None
+    dimensions = {p.name: p.dimension for p in two.variant.parameters}
+    lengths = [p for p in one.shapes if dimensions[p.name] in ("V", "Z", "D")]
+    theirs = {p.name: p for p in two.parameters}
+    if not lengths:
+        return None
+    ratio = theirs[lengths[0].name].typical / lengths[0].typical
+    shaft = {"V": ratio, "Z": ratio, "D": ratio, "W": 1.0 / ratio, "F": 1.0 / ratio}
+    factors = {p.name: p.scale(shaft) for p in two.variant.parameters}
+    values = dict(winner.fit.unknowns.named(winner.fit.vector))
+    values |= {
+        theirs[p.name].variable: values[p.variable] * factors[p.name]
+        for p in one.parameters
+        if p.variable in values
+    }
+    unknowns = other.fit.unknowns
+    if any(name not in values for name in unknowns.names):
+        return None
+    vector = unknowns.clip(np.array([values[name] for name in unknowns.names]))
+    return replace(other, fit=replace(other.fit, vector=vector))
 
 
 def simplest_first(scored: Sequence[Scored], ties: Callable[[Scored, Scored], bool]) -> list[Scored]:
@@ -239,8 +272,13 @@ class Selection:
         for other in scored:
             candidate = other.candidate
             name = candidate.name if candidate.effect.name == effect else candidate.effect.name
-            if name in (own, *rivals, *named) or other.held_out_gain < RIVAL_SHARE * winner.held_out_gain:
+            if name in (own, *rivals, *named):
                 continue
+            if other.held_out_gain < RIVAL_SHARE * winner.held_out_gain:
+                start = geared(winner, other)
+                if start is None:
+                    continue
+                other = start
             polished = self.polished(other)
             if self._ties(polished, winner) and not self.fits_better(winner, polished):
                 rivals[name] = polished

@@ -52,7 +52,12 @@ def clearest(part: Part) -> Figure | None:
     panels = _read(path) if path.is_file() else []
     if not panels:
         return None
-    return _figure(f"{part.prefix}evidence", [max(panels, key=lambda panel: panel.clarity)], height=340)
+    best = max(panels, key=lambda panel: panel.clarity)
+    caption = (
+        f"Mean residual of {best.channel} over {best.variable}, by the declared model (before) and with what was added"
+        " (after)"
+    )
+    return _figure(f"{part.prefix}evidence", [best], height=340, what="residual of ", caption=caption)
 
 
 def structure(part: Part) -> Section | None:
@@ -153,7 +158,13 @@ def _read(path: Path) -> list[_Panel]:
     return [_Panel(*key, *np.array(sorted(values), dtype=np.float64).T) for key, values in rows.items()]
 
 
-def _figure(name: str, panels: list[_Panel], height: int = 210) -> Figure:
+def _figure(
+    name: str,
+    panels: list[_Panel],
+    height: int = 210,
+    what: str = "",
+    caption: str = "Mean residual over possible causes",
+) -> Figure:
     columns = min(COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
     drawn = Chart(name, rows=rows, columns=columns, row_height=height)
@@ -166,7 +177,7 @@ def _figure(name: str, panels: list[_Panel], height: int = 210) -> Figure:
                     panel.centre, values, label, at=at, colour=colour, size=5, joined=True, error=error
                 )
         drawn.level(0.0, at=at)
-        drawn.axes(*at, x=f"{panel.variable} [{panel.unit}]", y=f"{panel.channel} [{panel.channel_unit}]")
-    return drawn.build(
-        "Mean residual over possible causes, in bins, with 95 % intervals; 0 means nothing is left."
-    )
+        drawn.axes(
+            *at, x=f"{panel.variable} [{panel.unit}]", y=f"{what}{panel.channel} [{panel.channel_unit}]"
+        )
+    return drawn.build(f"{caption}, in bins, with 95 % intervals; 0 means nothing is left.")

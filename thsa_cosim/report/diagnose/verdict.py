@@ -225,17 +225,21 @@ def _effects_table(effects: list[Json]) -> Table:
         Column("unit", numeric=False),
         Column("not distinguished from", numeric=False),
     ]
-    rows = []
+    rows, reasons = [], []
     for effect in effects:
         likely, alike = effect.get("probability"), listing(effect.get("equivalent") or [])
         named = [text_cell(_name(effect)), Cell(_probability(likely), likely)]
         if not effect.get("parameters"):
             rows.append((*named, text_cell(DASH), Cell(DASH), text_cell(""), text_cell(alike)))
         for name, value in effect.get("parameters", {}).items():
-            text = plus_minus(value["value"], value.get("stderr"))
-            own = (text_cell(name), Cell(text, value["value"]), text_cell(value.get("unit", "")))
+            text, mark = plus_minus(value["value"], value.get("stderr")), ""
+            if value.get("identifiable") is False:
+                text, mark = f"({text})", "bad"
+                reasons.append(f"{name}, {value['reason']}" if value.get("reason") else name)
+            own = (text_cell(name), Cell(text, value["value"], mark), text_cell(value.get("unit", "")))
             rows.append((*named, *own, text_cell(alike)))
-    return Table("Result: effects with their parameters ± one standard error", columns, rows)
+    note = f"In brackets: not determined by these data: {'; '.join(reasons)}." if reasons else ""
+    return Table("Result: effects with their parameters ± one standard error", columns, rows, note)
 
 
 def _probability(share: float | None) -> str:

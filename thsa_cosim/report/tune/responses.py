@@ -67,4 +67,5 @@ def _figure(name: str, found: SignalFile) -> Figure:
     for row, channel in enumerate(others, start=2):
         drawn.axes(row, 0, y=f"{channel} [{found.units.get(channel, '1')}]")
     drawn.axes(rows - 1, 0, x="time [s]")
-    return drawn.build(f"{found.name}: command and response, tracking error, and control effort.")
+    below = ", tracking error, and control effort" if others else " and, below, tracking error"
+    return drawn.build(f"{found.name}: command, response{below}.")

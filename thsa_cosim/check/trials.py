@@ -142,8 +142,10 @@ class Trials(Bench):
             return
         # Machine code takes a second to load, and pays where there are many steps.
         many = len(tried) * len(self._time) > _MANY_STEPS
+        # What the scenario gives a value of its own differs from what is declared, and rightly.
+        own = tried.keys() - self._values.keys()
         declared = {
-            v.name: v.start for v in self._description.parameters if v.name in tried and v.start is not None
+            v.name: v.start for v in self._description.parameters if v.name in own and v.start is not None
         }
         with self._runner(backend=None if many else "python") as runner:
             jobs = [Job("trial", declared), *(Job("trial", {n: v}) for n, v in tried.items())]

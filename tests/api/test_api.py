@@ -1,10 +1,12 @@
 """``import thsa_cosim as tc``: studies as tables and figures, run here or opened from their folder."""
 
+import errno
 import json
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +15,7 @@ from matplotlib.figure import Figure
 from small_scenario import toml
 
 import thsa_cosim as tc
-from thsa_cosim.errors import InputError, ScenarioError
+from thsa_cosim.errors import InputError, MachineError, ScenarioError
 from thsa_cosim.report.signal_files import write_signals
 from thsa_cosim.signals import Signals
 
@@ -160,6 +162,62 @@ def test_a_scenario_may_be_a_dict(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         tc.simulate({**scenario, "titel": "x"})
 
 
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"seed": "a"}, "seed must be a whole number from 0 on, not 'a'."),
+        ({"seed": -1}, "seed must be a whole number from 0 on, not -1."),
+        ({"workers": 0}, "workers must be a whole number from 1 on, not 0."),
+        ({"workers": 1.5}, "workers must be a whole number from 1 on, not 1.5."),
+    ],
+)
+def test_numbers_that_are_none_claim_no_folder(
+    tmp_path: Path, arguments: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises(InputError) as raised:
+        tc.identify(SCENARIOS / "screw.toml", folder=tmp_path / "study", **arguments)
+    assert str(raised.value) == sentence
+    assert not (tmp_path / "study").exists()
+
+
+def test_what_is_no_scenario_is_one_sentence() -> None:
+    for source in (None, 42):
+        with pytest.raises(ScenarioError, match="path of a TOML file, or its content as a dict, not"):
+            tc.identify(source)  # type: ignore[arg-type]
+
+
+def test_one_recording_needs_no_list(tmp_path: Path) -> None:
+    one = str(SCENARIOS / "recordings" / "screw_p25.parquet")
+    study = tc.simulate(SCENARIOS / "screw.toml", fit=one, folder=tmp_path, workers=np.int64(1), quiet=True)
+    assert study.recordings.index.get_level_values("recording").unique().tolist() == ["screw_p25"]
+
+
+def test_a_full_disk_names_the_folder_and_the_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("thsa_cosim.report.simulate.files.write_signals", refuse)
+    with pytest.raises(
+        MachineError, match=r"folder .*study cannot be written \(No space.*same command again\.$"
+    ):
+        tc.simulate(
+            SCENARIOS / "screw.toml",
+            fit=SCENARIOS / "recordings" / "screw_p25.parquet",
+            folder=tmp_path / "study",
+            workers=1,
+            quiet=True,
+        )
+
+
+def test_a_law_that_is_missing_says_why(tmp_path: Path) -> None:
+    why = "T_fg has no quadratic law: that needs 3 temperatures, there are 2."
+    (tmp_path / "result.json").write_text(json.dumps({"kind": "identify", "laws": {}, "notes": [why]}))
+    study = tc.open_study(tmp_path)
+    assert isinstance(study, tc.IdentifyStudy)
+    with pytest.raises(InputError, match=f"'T_fg' has no law. {why}"):
+        study.law("T_fg")
+
+
 def test_a_scenario_of_another_kind_names_the_right_one(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match="of kind 'tune': run 'thsa-cosim tune "):
         tc.identify(SCENARIOS / "table4.toml")
@@ -195,16 +253,17 @@ def test_a_diagnosis_tells_effects_and_held_out_errors(tmp_path: Path) -> None:
     study = tc.open_study(tmp_path)
     assert isinstance(study, tc.DiagnoseStudy)
     assert study.effects.empty
-    assert list(study.effects.columns) == ["value", "stderr", "unit", "probability"]
+    assert list(study.effects.columns) == ["value", "stderr", "unit", "identifiable", "probability"]
     assert study.held_out.loc["v", "before"] == 3e-5
 
-    value = {"value": 6e-6, "stderr": 1e-8, "unit": "N.m.s2/rad2"}
+    value = {"value": 6e-6, "stderr": 1e-8, "unit": "N.m.s2/rad2", "identifiable": False}
     effect = {"name": "windage:motor", "probability": 0.99, "parameters": {"b_q": value}}
     found |= {"effects": [effect], "after": {"fit": {}, "validate": {"v": {"rmse": 2e-5, "noise": 2e-5}}}}
     (tmp_path / "result.json").write_text(json.dumps(found))
     study = tc.open_study(tmp_path)
     assert isinstance(study, tc.DiagnoseStudy)
     assert study.effects.loc[("windage:motor", "b_q"), "value"] == 6e-6
+    assert not study.effects.loc[("windage:motor", "b_q"), "identifiable"]
     assert study.held_out.loc["v", "after"] == 2e-5
 
 

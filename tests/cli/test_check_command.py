@@ -41,6 +41,15 @@ def test_a_scenario_is_checked_by_its_ending(
     assert lines["start values"]["text"].startswith("each of")
 
 
+@pytest.mark.slow
+def test_a_scenarios_own_start_values_are_no_fault_of_the_fmu(capsys: pytest.CaptureFixture[str]) -> None:
+    """Parameters start in the middle of their bounds, not where the FMU declares them."""
+    assert run_command(["check", str(ROOT / "scenarios/gearbox.toml"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert "declared values" not in json.dumps(found)
+    assert found["verdict"] == "ok"
+
+
 def test_options_of_an_fmu_and_the_exit_code_of_a_failed_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

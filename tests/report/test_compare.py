@@ -107,6 +107,7 @@ def test_the_surest_difference_comes_first_and_a_model_that_leaves_more_than_noi
     found = compare([folder / "first", tmp_path / "other"])
     assert found.sentence().startswith("T_fm rose by 100 ")
     assert "; R_s rose by 5 " in found.sentence()
+    assert found.sentence().endswith("; this is in doubt, since the model leaves more than noise in other.")
     assert any("more than noise in other" in note for note in found.notes)
 
 

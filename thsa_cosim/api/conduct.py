@@ -4,11 +4,12 @@ A kind says which scenarios it takes, how it runs one, what it writes, how it pr
 again; loading, the folder's name, progress and what is added to every ``result.json`` are the same for all.
 """
 
+import contextlib
 import datetime
 import json
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from thsa_cosim.api.finished import Finished, finished, keep_finished
 from thsa_cosim.api.kinds import DiagnoseStudy, IdentifyStudy, SimulateStudy, TuneStudy
 from thsa_cosim.api.study import Study
-from thsa_cosim.errors import ScenarioError
+from thsa_cosim.errors import MachineError, ScenarioError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -274,12 +275,28 @@ def conduct(asked: Asked, *, quiet: bool = False) -> Conducted:
             sentence = f"{folder} holds this study, complete: it is shown again, and nothing is simulated."
             console(stderr=True).print(sentence, highlight=False, markup=False, soft_wrap=True)
         return found
-    with ProgressDisplay(console(stderr=True), quiet=quiet) as display:
+    with _disk_of(folder), ProgressDisplay(console(stderr=True), quiet=quiet) as display:
         result = kind.run(asked.scenario, replace(asked.place, on_progress=display))
         done = Conducted(asked, result, tuple(kind.write(result, folder)))
         if kind.name != "diagnose" and done.status == "complete":
             keep_finished(folder, done.show, done.files, done.objection, shown_words(asked.scenario))
     return done
+
+
+@contextlib.contextmanager
+def _disk_of(folder: Path) -> Iterator[None]:
+    """MachineError with the folder's name where the disk of a study refuses a file."""
+    from thsa_cosim.fmu.machine import is_machines
+
+    try:
+        yield
+    except OSError as error:
+        if not is_machines(error):
+            raise
+        raise MachineError(
+            f"The study folder {folder} cannot be written ({error.strerror}); repair that, or make room, and give the"
+            " same command again."
+        ) from None
 
 
 def show_data(asked: Asked, out: "Console") -> None:

@@ -60,7 +60,10 @@ class IdentifyStudy(Study):
 
         laws = self.result["laws"]
         if parameter not in laws:
-            raise InputError(f"{self.folder}: {parameter!r} has no law.{did_you_mean(parameter, laws)}")
+            why = next((f" {note}" for note in self.notes if note.startswith(f"{parameter} has no ")), "")
+            raise InputError(
+                f"{self.folder}: {parameter!r} has no law.{why or did_you_mean(parameter, laws)}"
+            )
         content = laws[parameter]
         covariance = content.get("covariance")
         return Law(
@@ -152,19 +155,22 @@ class DiagnoseStudy(Study):
 
     @property
     def effects(self) -> "pd.DataFrame":
-        """Index effect and parameter; value and stderr in ``unit``, and the effect's probability."""
+        """Index effect and parameter; value and stderr in ``unit``, whether the data determine it, the probability."""
 
         rows = {
             (effect["name"], name): {
                 "value": estimate["value"],
                 "stderr": estimate.get("stderr"),
                 "unit": estimate["unit"],
+                "identifiable": estimate.get("identifiable", True),
                 "probability": effect.get("probability"),
             }
             for effect in self.result["effects"]
             for name, estimate in effect["parameters"].items()
         }
-        return frame(rows, ["effect", "parameter"], ("value", "stderr", "unit", "probability"))
+        return frame(
+            rows, ["effect", "parameter"], ("value", "stderr", "unit", "identifiable", "probability")
+        )
 
     @property
     def held_out(self) -> "pd.DataFrame":

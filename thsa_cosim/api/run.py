@@ -1,17 +1,19 @@
 """Run a scenario and open what it leaves: each function is its command without the printing."""
 
 from collections.abc import Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from thsa_cosim.api.conduct import ask, conduct
 from thsa_cosim.api.kinds import DiagnoseStudy, IdentifyStudy, SimulateStudy, TuneStudy
 from thsa_cosim.api.study import Study
+from thsa_cosim.errors import InputError
 
 if TYPE_CHECKING:
     from thsa_cosim.scenario import Source
 
-Recordings = Sequence[Path | str]
+Recordings = Path | str | Sequence[Path | str]
 S = TypeVar("S", bound=Study)
 
 
@@ -35,7 +37,7 @@ def identify(
         Study folder; one that holds this study already is continued. Default ``studies/<scenario>-<date>``;
         of a dict the title takes the place of the scenario's name.
     fit, validate
-        Recordings instead of the scenario's own.
+        Recordings instead of the scenario's own: several, or one.
     seed, fmu
         Instead of the scenario's own.
     workers, cluster
@@ -109,7 +111,19 @@ def simulate(
 
 
 def _given(arguments: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in arguments.items() if name not in ("scenario", "quiet")}
+    """The arguments of a study as ``ask`` takes them; InputError for a number that is none."""
+    given = {name: value for name, value in arguments.items() if name not in ("scenario", "quiet")}
+    for role in ("fit", "validate"):
+        if isinstance(given.get(role), Path | str):
+            given[role] = (given[role],)
+    for name, least in (("seed", 0), ("workers", 1)):
+        value = given[name]
+        if value is None:
+            continue
+        if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+            raise InputError(f"{name} must be a whole number from {least} on, not {value!r}.")
+        given[name] = int(value)
+    return given
 
 
 def _conducted(command: str, kind: type[S], scenario: "Source", quiet: bool, given: dict[str, Any]) -> S:

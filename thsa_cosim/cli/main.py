@@ -4,6 +4,7 @@ Exit codes: 0 done, 2 bad input (one sentence on stderr), 3 the study ran but ha
 130 interrupted. Set THSA_COSIM_DEBUG=1 to see the traceback of an error.
 """
 
+import errno
 import os
 import sys
 import traceback
@@ -42,6 +43,14 @@ COMMANDS: tuple[click.Command, ...] = (
     example,
     completion,
 )
+
+
+#: What helps against an error of the operating system, and the exit code.
+_REMEDIES = {
+    errno.ENOSPC: ("; make room, and give the same command again", 3),
+    errno.EACCES: ("; allow it, or choose another place", 2),
+    errno.EROFS: ("; choose another place", 2),
+}
 
 
 class _Cli(click.Group):
@@ -110,7 +119,8 @@ def run_command(arguments: list[str]) -> int:
         return 0
     except OSError as error:
         where = f" ({error.filename})" if error.filename else ""
-        return _fail(f"{error.strerror or error}{where}.", 2)
+        remedy, code = _REMEDIES.get(error.errno or 0, ("", 2))
+        return _fail(f"{error.strerror or error}{where}{remedy}.", code)
     except MemoryError:
         return _fail("there is not enough memory: use shorter recordings, longer steps or fewer workers.", 3)
     except Exception as error:

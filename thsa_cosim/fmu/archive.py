@@ -36,6 +36,8 @@ def open_archive(path: Path) -> zipfile.ZipFile:
         raise FmuError(f"{path} is a pipe or device; name an .fmu file.")
     try:
         return zipfile.ZipFile(path)
+    except PermissionError as error:
+        raise FmuError(f"{path} cannot be read ({error.strerror}); allow it.") from None
     except (zipfile.BadZipFile, OSError) as error:
         raise FmuError(f"{path} is no zip archive and so no FMU ({error}).") from None
 

@@ -25,7 +25,14 @@ def read_source(source: Source) -> tuple[Path, dict[str, Any]]:
         return UNNAMED, source.model_dump(by_alias=True, exclude_unset=True)
     if isinstance(source, Mapping):
         return UNNAMED, {str(key): _plain(value) for key, value in source.items()}
-    return Path(source), read_toml(Path(source))
+    try:
+        path = Path(source)
+    except TypeError:
+        kind = type(source).__name__
+        raise ScenarioError(
+            f"A scenario is the path of a TOML file, or its content as a dict, not {kind}."
+        ) from None
+    return path, read_toml(path)
 
 
 def _plain(value: Any) -> Any:

@@ -31,14 +31,14 @@ def assemble_tables(path: Path, table: ModelTable) -> SystemDescription:
     """Return the system that the tables of the scenario ``path`` describe, kept as an archive."""
     parts = [
         Part(
-            c.name,
-            path.parent / c.fmu,
-            c.execution,
-            c.step,
-            c.delay,
-            {k: float(v) for k, v in c.start.items()},
-            c.jitter,
-            c.process,
+            name=c.name,
+            fmu=path.parent / c.fmu,
+            execution=c.execution,
+            step=c.step,
+            delay=c.delay,
+            jitter=c.jitter,
+            process=c.process,
+            start={k: float(v) for k, v in c.start.items()},
         )
         for c in table.components
     ]

@@ -36,9 +36,9 @@ from thsa_cosim.study import (
 from thsa_cosim.system.description import SystemDescription
 from thsa_cosim.tune.combine import INFEASIBLE, equation_7
 from thsa_cosim.tune.evaluate import Evaluation, evaluate, evaluate_each
-from thsa_cosim.tune.pareto import front
+from thsa_cosim.tune.pareto import front_of
 from thsa_cosim.tune.population import Line, PopulationPath, line_of
-from thsa_cosim.tune.problem import ALL, Group, SampledCondition, build_cases, build_groups
+from thsa_cosim.tune.problem import Group, SampledCondition, build_cases, build_groups
 from thsa_cosim.tune.results import (
     GroupResult,
     Pareto,
@@ -133,7 +133,7 @@ class _Tuning:
         if spec.surface is not None:
             self.surface = self._surface(engine)
         if spec.pareto is not None:
-            self.pareto = self._pareto(journal)
+            self.pareto = front_of(spec.pareto, journal)
         if spec.schedule is not None:
             self.schedule = self._schedule(engine)
 
@@ -269,20 +269,6 @@ class _Tuning:
     def _eq7_of_worst(self, worst: FloatArray) -> FloatArray:
         """Equation 7 of the worst terms (m, q): the cost itself where there is one condition."""
         return equation_7(self.scenario, self.names, worst)
-
-    def _pareto(self, journal: Journal) -> Pareto:
-        spec = self.scenario.pareto
-        assert spec is not None
-        i, j = self.names.index(spec.x), self.names.index(spec.y)
-        # Rows come in as their simulations end; by their numbers they are in the order of the search.
-        asked = sorted((row for row in journal.rows if row.stage == ALL), key=lambda row: row.index)
-        rows = [row for row in asked if row.cost < INFEASIBLE]
-        x, y = np.array([r.terms[i] for r in rows]), np.array([r.terms[j] for r in rows])
-        chosen = front(x, y)
-        values = np.array([rows[k].values for k in chosen]).reshape(
-            len(chosen), len(self.scenario.parameters)
-        )
-        return Pareto(spec.x, spec.y, x[chosen], y[chosen], values, x, y)
 
     # -- schedule -------------------------------------------------------------------------------------
     def _schedule(self, engine: Engine) -> ScheduleResult:

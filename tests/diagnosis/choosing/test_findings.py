@@ -14,6 +14,7 @@ from thsa_cosim.diagnosis.choosing.findings import (
     NO_MORE,
     found_effects,
     judged,
+    known_values,
     off_the_drawing,
     order_of,
     undetermined,
@@ -222,6 +223,38 @@ def test_ways_of_one_effect_are_one_with_its_places_spelt_out():
     assert [e.equivalent for e in effects] == [(), ("c:motor",)], "each has the rivals of its own round"
     assert {n: v.value for n, v in effects[0].parameters.items()} == {"motor.a.k": 1.0, "gear.a.k": 2.0}
     assert {n: v.value for n, v in effects[1].parameters.items()} == {"k": 3.0}
+
+
+def test_another_form_takes_the_place_of_the_accepted_one_wherever_it_stood(found: Any):
+    before = found.rounds[0]
+    old, (_, rival, worse) = before.accepted, before.scored
+    form = scored(proposal("a", 98.0, start=2.0))
+    after = before.with_accepted(form)
+    assert after.accepted is form
+    assert after.proposals == (form.proposal, *before.proposals[1:])
+    assert after.scored == (form, rival, worse)
+    assert (after.rivals, after.objections, after.gains is before.gains) == (before.rivals, ("",), True)
+    assert before.with_accepted(old) is before
+    nothing = replace(before, accepted=None)
+    assert nothing.with_accepted(form) is nothing
+
+
+def test_a_declared_effect_has_the_fitted_values_and_keeps_the_others_as_they_were_given():
+    fit = scored(proposal("a", 1.0)).fit  # p, which is declared, is 1.0
+    ways = [
+        SimpleNamespace(
+            candidate=SimpleNamespace(
+                name="drag:motor", parameters=(parameter("p"), parameter("n", "shape"))
+            ),
+            starts={"p": 7.0, "n": 2.5},
+        )
+    ]
+    (known,) = known_values(ways, fit, np.array([0.3, 0.1]))  # type: ignore[arg-type]
+    assert known.name == "drag:motor"
+    assert known.parameters == {
+        "p": Value(1.0, "N", 0.3, variable="p"),
+        "n": Value(2.5, "N", 0.0, variable="n", role="shape"),
+    }
 
 
 def test_values_are_widened_by_what_is_left_and_split_into_declared_and_effects():

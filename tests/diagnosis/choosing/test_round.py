@@ -55,6 +55,10 @@ class Stages:
         assert scored == [self.one]
         return self._open
 
+    def at_sizes(self, scored: Any, proposals: Any) -> list[Any]:
+        self.asked["sizes"] = (scored, list(proposals))
+        return list(scored)
+
     def further(self, proposals: Any) -> list[Any]:
         return [self.later]
 
@@ -100,12 +104,13 @@ def test_a_round_in_which_nothing_leaves_nothing_searches_further_starts_and_dra
     assert s.asked["refined"] == ([s.first, s.second], 20.0)
     assert s.asked["further"] == ([s.one], [s.first, s.second], [s.later], 20.0)
     assert s.draws == [([s.first, s.second], 7), ([s.first, s.later, s.second], 7)], "with the same seed"
+    assert s.asked["sizes"] == ([s.one, s.two], [s.first, s.second])
     assert s.asked["choose"] == ([s.one, s.two], 30.0, True, False)
     assert (found.threshold, found.gains.tolist(), found.factors.tolist()) == (30.0, [30.0], [2.0] * 3)
     assert found.proposals == (s.first, s.later, s.second)
     assert (found.scored, found.accepted, found.objections) == ((s.one, s.two), None, ("why",))
     assert (found.rivals, found.forms) == ((), ())
-    assert set(s.asked) == {"screen", "refined", "further", "choose"}
+    assert set(s.asked) == {"screen", "refined", "further", "sizes", "choose"}
 
 
 def test_a_round_with_a_fit_that_leaves_nothing_compares_it_with_rivals_and_forms(

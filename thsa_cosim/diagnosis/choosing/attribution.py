@@ -228,6 +228,7 @@ def _round(
     if whole and proposals and selection.is_open(scored):
         further = selection.further(proposals)
         scored = selection.refined_further(scored, proposals, further, limit)
+        scored = selection.at_sizes(scored, proposals)
         proposals = sorted([*proposals, *further], key=lambda p: -p.gain)
         gains = largest_gains(selection.current, proposals, seed)
         limit = threshold(gains)
@@ -261,6 +262,12 @@ def _taken_over(
     return [choice, *(s for s, _ in others)], ("", *whys)
 
 
+def _carries(candidate: Candidate, others: Sequence[Candidate]) -> bool:
+    """Whether one of ``others`` is a part that is only offered beside the candidate; a ripple's orders are equals."""
+    waves = any(p.scanned for p in candidate.parameters)
+    return not waves and not candidate.variant.beside and bool(further_parts(candidate, others))
+
+
 def prune(
     bench: Bench,
     unknowns: Unknowns,
@@ -274,6 +281,8 @@ def prune(
     while len(accepted) > 1:
         for dropped in accepted[:-1]:
             kept = [s for s in accepted if s is not dropped]
+            if _carries(dropped.candidate, [s.candidate for s in kept]):
+                continue
             fewer = extended_unknowns(unknowns, kept)
             vector = current.at(fewer.names)
             fit = refine(bench, fewer, vector, iterations=6, enough=3.0)

@@ -143,6 +143,14 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scor
     return _scored(bench, choice.proposal, best, current, held) or choice
 
 
+def refit(
+    bench: Bench, proposal: Proposal, current: Fit, held: FloatArray, unknowns: Unknowns, vector: FloatArray
+) -> Scored | None:
+    """A proposal fitted with all parameters from ``vector`` (n,), every Jacobian column fresh; None if it fails."""
+    fit = refine(bench, unknowns, vector, enough=3.0)
+    return None if fit is None else _scored(bench, proposal, fit, current, held)
+
+
 def extended_unknowns(declared: Unknowns, accepted: Sequence[Scored]) -> Unknowns:
     """The declared parameters and those of the accepted effects, the latter from their own starts."""
     members = [u for s in accepted for u in unknowns_of(s.candidate, s.proposal.shapes, s.proposal.held)]

@@ -19,6 +19,7 @@ from thsa_cosim.diagnosis.choosing.gates import (
 )
 from thsa_cosim.diagnosis.choosing.score import Scored, go_on, polish, score
 from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.choosing.sizes import at_sizes, is_led_astray
 from thsa_cosim.diagnosis.choosing.starts import PROMISING, further_starts
 from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE, is_visible
 from thsa_cosim.diagnosis.fitting.bench import Bench
@@ -199,6 +200,14 @@ class Selection:
         chosen = sorted([*better, *other_waves(proposals, scored)], key=lambda p: -p.gain)
         found = sorted([*scored, *self.fitted(chosen)], key=lambda s: -s.held_out_gain)
         return simplest_first(found, self._ties)
+
+    def at_sizes(self, scored: Sequence[Scored], proposals: Sequence[Proposal]) -> list[Scored]:
+        """``scored`` and, where they lead astray, effects of larger sizes than their responses promise; best first."""
+        if not is_led_astray(self.current, scored):
+            return list(scored)
+        self.say("trying effects of larger sizes")
+        found = [*scored, *at_sizes(self.bench, self.current, self.held, proposals)]
+        return simplest_first(sorted(found, key=lambda s: -s.held_out_gain), self._ties)
 
     def evidence(self, one: Scored) -> Evidence:
         """What speaks for a candidate."""

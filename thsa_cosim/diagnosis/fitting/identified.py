@@ -14,6 +14,9 @@ from thsa_cosim.errors import StudyError
 from thsa_cosim.scenario import OpenRunner, SimulationTable
 from thsa_cosim.signals import FloatArray, Signals
 
+#: Where a start cannot be simulated, so many vectors beside it are tried, within this share of the ordinary changes.
+TRIES, NEAR = 4, 1e-3
+
 
 @dataclass(frozen=True, eq=False)
 class Identified:
@@ -44,6 +47,19 @@ def between_starts(best: Fit, ends: Sequence[tuple[FloatArray, float]]) -> Float
     return np.asarray(np.sqrt(weights @ squares / (1.0 + weights.sum())))
 
 
+def _runs(bench: Bench, unknowns: Unknowns, start: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+    """``start`` (n,) and its residuals (N,), or those of a vector close by where a solver fails at that very point."""
+    (residual,) = bench.residuals(unknowns, start[None, :], "fit")
+    if residual is not None:
+        return start, residual
+    shifts = NEAR * unknowns.scale * np.random.default_rng(0).uniform(-1.0, 1.0, (TRIES, start.size))
+    vectors = np.array([unknowns.clip(start + shift) for shift in shifts])
+    for vector, found in zip(vectors, bench.residuals(unknowns, vectors, "fit"), strict=True):
+        if found is not None:
+            return vector, found
+    return start, None
+
+
 def identify_model(
     fmu: Path,
     trials: tuple[Trial, ...],
@@ -59,10 +75,10 @@ def identify_model(
     own = with_fmu(trials, fmu)
     with open_runner(simulation, [t.experiment for t in own]) as runner:
         bench = Bench(runner, own)
-        found = bench.residuals(unknowns, np.array(starts), "fit")
+        begun = [_runs(bench, unknowns, start) for start in starts]
         fits: list[Fit] = []
         ends: list[tuple[FloatArray, float]] = []
-        for residual, vector in zip(found, starts, strict=True):
+        for vector, residual in begun:
             known = min((f.cost for f in fits), default=np.inf)
             if residual is None:
                 continue

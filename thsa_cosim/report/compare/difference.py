@@ -158,7 +158,18 @@ class Comparison:
         text = "; ".join(parts) or "no uncertainty is known, so no difference can be tested"
         if text.startswith(("only ", "no ")):  # a name stays as it is
             text = text[0].upper() + text[1:]
-        return text + (f" (|z| > {self.limit:.3g})." if tested else ".")
+        text += f" (|z| > {self.limit:.3g})" if tested else ""
+        return f"{text}{self._doubt()}."
+
+    def _doubt(self) -> str:
+        """Which of the studies cannot be believed, as the end of the sentence; "" if all can."""
+        poor = [
+            label for label, study in zip(self.labels, self.studies, strict=True) if _is_unexplained(study)
+        ]
+        if not poor:
+            return ""
+        models = "the model leaves" if len(poor) == 1 else "the models leave"
+        return f"; this is in doubt, since {models} more than noise in {listing(poor)}"
 
     def _tested(self) -> dict[str, int]:
         """The quantities whose difference has an uncertainty, with how many differences each has."""

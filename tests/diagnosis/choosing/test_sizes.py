@@ -1,0 +1,99 @@
+"""Sizes of an effect: where declared parameters are bent to make up for a large one, it is tried over decades."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.analytic import bench, candidates, unknowns
+from thsa_cosim.diagnosis.choosing.attribution import prune
+from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
+from thsa_cosim.diagnosis.choosing.sizes import FITTED, SIZES, at_sizes, is_led_astray
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit, refine
+from thsa_cosim.diagnosis.fitting.identified import _runs
+
+MU = "motorEffect.loadDependentFriction.mu"
+#: Coulomb friction that ends at the end of its range where the load's friction is missing.
+NARROW = {"lower": 0.2, "upper": 0.8}
+
+
+def astray(mu: float) -> tuple[Bench, Fit, list[Proposal], np.ndarray]:
+    """A drive that loses ``mu`` times its load, the declared model's fit, what is proposed, the held-out residuals."""
+    offered = candidates("load-dependent-friction", "windage", "stribeck")
+    own = bench(offered, {MU: mu})
+    declared = unknowns(c=NARROW)
+    base = refine(own, declared, declared.start, iterations=10)
+    assert base is not None
+    held = own.residuals(declared, base.vector[None, :], "validate")[0]
+    assert held is not None
+    plain = [c for c in offered if not c.variant.beside]
+    return own, base, screen(own, base, plain, {}), held
+
+
+@pytest.mark.parametrize("mu", [0.7, 4.0])
+def test_a_load_that_is_lost_several_times_over_is_found_from_its_size(mu: float) -> None:
+    own, base, proposals, held = astray(mu)
+    assert is_led_astray(base, [])
+    found = at_sizes(own, base, held, proposals)
+    best = max(found, key=lambda s: s.held_out_gain)
+    assert len(found) <= FITTED
+    assert best.candidate.effect.name == "load-dependent-friction"
+    value = best.fit.unknowns.named(best.fit.vector)
+    assert value[MU if MU in value else MU.replace("motor", "gear")] == pytest.approx(mu, rel=0.05)
+    assert best.share > 0.95
+
+
+def test_sizes_go_over_decades_from_the_fit_and_from_the_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
+    own, base, proposals, held = astray(0.7)
+    asked: list[np.ndarray] = []
+    whole = own.residuals
+    monkeypatch.setattr(
+        own, "residuals", lambda u, vectors, part: asked.append(vectors) or whole(u, vectors, part)
+    )
+    first = next(
+        p for p in proposals if p.candidate.coefficients[0].variable == MU and len(p.amplitudes) == 1
+    )
+    at_sizes(own, base, held, [first])
+    tried = asked[0]
+    typical, upper = first.candidate.coefficients[0].typical, first.candidate.coefficients[0].upper
+    assert set(np.round(tried[:, -1], 9)) == {round(min(size * typical, upper), 9) for size in SIZES}
+    assert {tuple(row) for row in tried[:, :-1]} == {tuple(base.vector), tuple(base.unknowns.start)}
+
+
+def test_a_model_is_not_astray_whose_parameters_stay_or_where_an_effect_explains_half() -> None:
+    _, base, _, _ = astray(0.7)
+    explains: Any = SimpleNamespace(share=0.6)
+    hardly: Any = SimpleNamespace(share=0.4)
+    assert is_led_astray(base, [hardly])
+    assert not is_led_astray(base, [hardly, explains])
+    sound = refine(bench(candidates("windage"), {}), unknowns(), unknowns().start)
+    assert sound is not None
+    assert not is_led_astray(sound, [])
+
+
+def test_a_start_at_which_a_solver_fails_is_moved_a_little() -> None:
+    own, declared = bench(candidates("windage"), {}), unknowns()
+
+    class Failing:
+        def residuals(self, u: Any, vectors: np.ndarray, part: Any) -> list[np.ndarray | None]:
+            found = own.residuals(u, vectors, part)
+            return [None if np.array_equal(v, u.start) else r for v, r in zip(vectors, found, strict=True)]
+
+    vector, residual = _runs(Failing(), declared, declared.start)  # type: ignore[arg-type]
+    assert residual is not None
+    assert 0.0 < np.max(np.abs(vector - declared.start) / declared.scale) <= 1e-3
+    nothing: Any = SimpleNamespace(residuals=lambda u, vectors, part: [None] * len(vectors))
+    assert _runs(nothing, declared, declared.start)[1] is None
+
+
+def test_what_further_parts_stand_beside_is_not_pruned() -> None:
+    """A breakaway part may be wide enough to stand for the whole friction per load; it is no part without it."""
+    offered = {c.key: c for c in candidates("load-dependent-friction")}
+    whole, part = (offered[f"load-dependent-friction:motor/loadDependentFriction{k}"] for k in (0, 2))
+    accepted: Any = [SimpleNamespace(candidate=whole), SimpleNamespace(candidate=part)]
+    held = np.zeros(3)
+    kept, *_, notes = prune(None, None, None, accepted, None, held)  # type: ignore[arg-type]
+    assert kept == accepted
+    assert notes == []

@@ -149,3 +149,24 @@ def test_a_logger_that_starts_again_is_told_from_rows_out_of_order() -> None:
     (swap,) = (f for f in found(signals(), order) if f.kind == "repeated-stamps")
     assert "goes back once" in swap.text
     assert "started again" not in swap.text
+
+
+@pytest.mark.parametrize("until", [4000, TIME.size])
+def test_a_sensor_that_stops_on_its_largest_value_is_stuck(until: int) -> None:
+    current = signals()["i"][0].copy()
+    current[2500] = current.max() + 0.01
+    current[2500:until] = current[2500]
+    assert ("i", "stuck") in told(changed("i", current))
+    assert ("i", "clipped") not in told(changed("i", current))
+
+
+def test_a_current_on_its_limit_for_once_is_not_stuck() -> None:
+    current = np.minimum(signals()["i"][0], 2.2)
+    assert told(changed("i", current)) & {("i", "stuck"), ("i", "clipped")} == {("i", "clipped")}
+
+
+@pytest.mark.parametrize("code", [65.535, -32.768, 12.5])
+def test_a_level_off_all_others_is_a_code(code: float) -> None:
+    current = signals()["i"][0].copy()
+    current[[900, 1700, 2900, 3300, 4100, 5200]] = code
+    assert told(changed("i", current)) == {("i", "sentinel")}

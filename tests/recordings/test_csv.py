@@ -358,3 +358,40 @@ def test_decimal_signs_that_change_within_a_file_are_refused(tmp_path):
     path.write_text("\n".join(rows))
     with pytest.raises(RecordingError, match=r"row 41 have the decimal sign '\.', those from there on ','"):
         column_names(path)
+
+
+def test_a_name_over_two_columns_is_not_read_as_the_first(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t,v,v,t\n0,1,5,0\n1,2,6,1\n2,3,7,2\n")
+    columns = load_columns(path)
+    assert "twice in the header (columns 2 and 3)" in (columns["v"].problem or "")
+    np.testing.assert_array_equal(columns["t"].values, [0.0, 1.0, 2.0])  # the same numbers again
+
+
+def test_a_last_line_that_lacks_a_cell_was_cut_off(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t,v,u\n" + "".join(f"{k},{k}.5,7\n" for k in range(20)) + "20,20.")
+    assert load_columns(path)["u"].values.size == 20
+
+
+@pytest.mark.parametrize("number", ["1,234.5", "1.234,5"])
+def test_thousands_separators_are_named(tmp_path, number):
+    path = tmp_path / "a.csv"
+    small = number[2:]
+    path.write_text("t;v\n" + "".join(f"{k};{number if k % 9 == 4 else small}\n" for k in range(40)))
+    columns = load_columns(path)
+    assert columns["t"].values.size == 40
+    assert repr(number) in (columns["v"].problem or "")
+
+
+@pytest.mark.parametrize("dates", [("04/03/2024", "04/04/2024"), ("03/04/2024", "04/04/2024")])
+def test_a_day_follows_another_over_midnight_and_no_month(tmp_path, dates):
+    path = tmp_path / "a.csv"
+    clocks = [
+        (dates[0], "23:59:59.500"),
+        (dates[0], "23:59:59.750"),
+        (dates[1], "00:00:00.000"),
+        (dates[1], "00:00:00.250"),
+    ]
+    path.write_text("t,v\n" + "".join(f"{d} {c},1\n" for d, c in clocks))
+    np.testing.assert_allclose(load_columns(path)["t"].values, [0.0, 0.25, 0.5, 0.75])

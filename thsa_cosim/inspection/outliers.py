@@ -6,6 +6,7 @@ import numpy as np
 
 from thsa_cosim.inspection.channel import Channel, share
 from thsa_cosim.inspection.finding import Finding, Severity
+from thsa_cosim.inspection.samples import coded
 from thsa_cosim.recordings.noise import RESTING
 from thsa_cosim.recordings.outliers import Mask
 
@@ -13,6 +14,8 @@ _FALL = 8.0
 """σ by which a signal has to fall into a drop-out and rise out of it."""
 _SAME = 0.6
 """Share of the outliers that have one value if they are drop-outs."""
+_OFF = 0.3
+"""Share of the range of everything else, by which a level that keeps coming back is off it."""
 _FEW = 3
 _MANY, _LARGE, _LARGE_SHARE = 5, 12.0, 0.05
 """Spikes, or the σ or share of the range of their usual size, from which on they are a warning."""
@@ -25,7 +28,9 @@ def outliers(channel: Channel) -> Iterator[Finding]:
     dropped, level = _dropouts(channel)
     remedy = f"[recordings.columns.{channel.name}]\ndespike = true"
     count = int(np.sum(dropped))
-    if count:
+    if count and _beyond(channel, level):
+        yield coded(channel, dropped)
+    elif count:
         part = share(count / dropped.size)
         text = f"{channel.name} drops to {channel.number(level)} and back: {count} samples ({part})"
         yield channel.finding("dropouts", "warning", text, channel.spans(dropped), remedy)
@@ -40,6 +45,12 @@ def outliers(channel: Channel) -> Iterator[Finding]:
             sure &= size > _LARGE_SHARE * channel.range
         severity: Severity = "warning" if sure else "note"
         yield channel.finding("spikes", severity, text, channel.spans(spikes), remedy)
+
+
+def _beyond(channel: Channel, level: float) -> bool:
+    """Whether ``level`` lies off everything else that the channel gives: a code of its logger, no lost signal."""
+    others = channel.plain[channel.plain != level]
+    return level != 0.0 and max(level - others.max(), others.min() - level) > _OFF * float(np.ptp(others))
 
 
 def _dropouts(channel: Channel) -> tuple[Mask, float]:

@@ -8,6 +8,7 @@ from thsa_cosim.inspection.channel import Channel, share
 from thsa_cosim.inspection.finding import Finding, Severity
 from thsa_cosim.recordings.independence import lattice_step
 from thsa_cosim.recordings.noise import RESTING, white_noise
+from thsa_cosim.recordings.outliers import Mask
 from thsa_cosim.signals import FloatArray
 
 _DITHERED = 0.7
@@ -137,15 +138,19 @@ def resolution(channel: Channel) -> Iterator[Finding]:
 
 def sentinels(channel: Channel) -> Iterator[Finding]:
     """Codes for a missing value."""
-    if not channel.coded.any():
-        return
+    if channel.coded.any():
+        yield coded(channel, channel.coded)
+
+
+def coded(channel: Channel, mask: Mask) -> Finding:
+    """The finding that the samples of ``mask`` (n,) are codes."""
     written = channel.values if channel.written is None else channel.written
-    codes = np.unique(written[channel.coded])
-    count = int(np.sum(channel.coded))
+    codes = np.unique(written[mask])
+    count = int(np.sum(mask))
     shown = ", ".join(f"{code:.6g}" for code in codes[:4])
     part, plural = share(count / channel.values.size), "s" if count > 1 else ""
     text = f"{count} sample{plural} of {shown} far outside of everything else ({part})"
     remedy = (
         f"[recordings.columns.{channel.name}]\nmissing = [{', '.join(repr(float(c)) for c in codes[:4])}]"
     )
-    yield channel.finding("sentinel", "error", text, channel.spans(channel.coded, 1), remedy)
+    return channel.finding("sentinel", "error", text, channel.spans(mask, 1), remedy)

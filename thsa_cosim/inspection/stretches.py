@@ -18,6 +18,8 @@ _COMMANDED = 3e-4
 _HOPS = 8
 """Short stays at a limit that make it one."""
 _LEAST_STUCK = 40.0
+_LEAVES, _LEAVES_SHARE = 10.0, 0.05
+"""σ and share of the range by which what was stuck has moved meanwhile; what was clipped comes back over its limit."""
 _MUCH, _OFTEN = 0.1, 5
 """Independent samples of one value, share of the recording that is an error, stretches that are no defect."""
 
@@ -29,8 +31,11 @@ def clipped(channel: Channel) -> Iterator[Finding]:
     if channel.role == "input" and (not channel.steady or channel.noise < _COMMANDED * channel.range):
         return  # a command stays where it is told to
     values = channel.clean[channel.fresh_index]
+    broken = stuck_mask(channel)
     limits = [
-        limit for limit in (float(values.max()), float(values.min())) if _piles_up(values, limit, channel)
+        limit
+        for limit in (float(values.max()), float(values.min()))
+        if _piles_up(values, limit, channel) and not np.all(broken[channel.plain == limit])
     ]
     if not limits:
         return
@@ -112,9 +117,19 @@ def stuck_mask(channel: Channel) -> Mask:
     limit = period * max(_LEAST_STUCK, 3.0 * np.log(channel.values.size) / -np.log(max(repeats, 0.05)))
     extremes = (channel.clean.min(), channel.clean.max())
     for first, length in zip(starts.tolist(), lengths.tolist(), strict=True):
-        if length > limit and channel.plain[first] not in extremes:
+        at_limit = channel.plain[first] in extremes and not _stays(channel, first, length)
+        if length > limit and not at_limit:
             mask[first : first + length] = True
     return mask
+
+
+def _stays(channel: Channel, first: int, length: int) -> bool:
+    """Whether a run on the largest or smallest value is no limit: the only one there, to the end or left by a jump."""
+    values, after = channel.plain, first + length
+    if np.sum(values == values[first]) > length:
+        return False
+    jump = max(_LEAVES * channel.noise, _LEAVES_SHARE * channel.range)
+    return after == values.size or bool(abs(values[after] - values[first]) > jump)
 
 
 def repeated(channel: Channel) -> Iterator[Finding]:

@@ -74,15 +74,30 @@ def read(path: Path, choose: Choose) -> dict[str, RawColumn]:
     rows = [(number, line) for number, line in numbered[layout.first :] if not line.startswith(_COMMENTS)]
     rows = _without_end(path, rows, layout)
     chosen = list(dict.fromkeys(choose([name for name in layout.header if name])))
-    places = [layout.header.index(name) for name in chosen]
+    named = [[k for k, other in enumerate(layout.header) if other == name] for name in chosen]
+    places = [k for places in named for k in places]
+    found = dict(zip(places, _columns(path, rows, layout, places), strict=True))
     columns: dict[str, RawColumn] = {}
-    for name, k, column in zip(chosen, places, _columns(path, rows, layout, places), strict=True):
+    for name, (k, *more) in zip(chosen, named, strict=True):
+        column = _one([(place, found[place]) for place in (k, *more)])
         unit = layout.units[k] if k < len(layout.units) and layout.units[k] else split_unit(name)[1]
         time: FloatArray | None = None
         if layout.step is not None:
             time = layout.step[0] + layout.step[1] * np.arange(len(rows), dtype=np.float64)
         columns[name] = RawColumn(column.values, column.unit or unit, time, column.problem)
     return columns
+
+
+def _one(columns: Sequence[tuple[int, RawColumn]]) -> RawColumn:
+    """The column of a name that the header has once, or more often over the same numbers."""
+    first = columns[0][1]
+    for place, other in columns[1:]:
+        if not np.array_equal(first.values, other.values, equal_nan=True) or first.problem != other.problem:
+            places = f"columns {columns[0][0] + 1} and {place + 1}"
+            return RawColumn(
+                problem=f"is named twice in the header ({places}), over other numbers; rename one"
+            )
+    return first
 
 
 def _lines(path: Path) -> list[tuple[int, str]]:
@@ -117,7 +132,8 @@ def _without_end(path: Path, rows: list[tuple[int, str]], layout: _Layout) -> li
     while last > 1 and len(rows) - last < _MOST_WORDS:
         cells = _split(rows[last - 1][1], layout.delimiter)
         words = bool(cells) and not any(_is_number(cell, layout.decimal) for cell in cells)
-        cut = last == len(rows) and len(cells) < layout.width - 1
+        before = len(_split(rows[last - 2][1], layout.delimiter))
+        cut = last == len(rows) and len(cells) < min(before, layout.width)
         if not (words and len(cells) < layout.width) and not cut:
             break
         last -= 1
@@ -157,7 +173,10 @@ def _dialect(path: Path, lines: Sequence[str], delimiters: Sequence[str]) -> _Di
     sample = half[:: max(1, len(half) // 200)]
     quoted = any('"' in line for line in sample)
     best = _Dialect(0.0, "", "", 0, 0)
-    for delimiter in delimiters:
+    # Semicolons and tabs are nothing but delimiters: what they part are cells, though their numbers be unreadable.
+    sure = [d for d in delimiters if d in "\t;" and len({line.count(d) for line in body[:1] + sample}) == 1]
+    sure = [d for d in sure if all(d in line for line in sample[:1])]
+    for delimiter in sure[:1] or delimiters:
         rows = [_split(line, delimiter) for line in sample]
         width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
         if width < 2:
@@ -364,9 +383,11 @@ def _dated(cells: Sequence[str]) -> RawColumn:
         raise ValueError("not all of them are dates")
     rows = [m.groups() for m in found if m]
     first, second = (np.array([int(row[k]) for row in rows]) for k in (0, 1))
-    months_first = second.max() > 12
+    # Over midnight a day follows the other, and no month.
+    months_first = second.max() > 12 or (np.ptp(first) == 0 and np.ptp(second) == 1 and "/" in cells[0])
     day, month = (second, first) if months_first else (first, second)
-    if months_first or first.max() > 12 or "." in cells[0] or (np.ptp(first) == 0 and np.ptp(second) == 0):
+    days_first = first.max() > 12 or (np.ptp(first) == 1 and np.ptp(second) == 0) or "/" not in cells[0]
+    if months_first or days_first or (np.ptp(first) == 0 and np.ptp(second) == 0):
         years = [int(row[2]) + (2000 if len(row[2]) == 2 else 0) for row in rows]
         texts = [f"{y:04d}-{m:02d}-{d:02d}" for y, m, d in zip(years, month, day, strict=True)]
         days = np.array(texts, dtype="datetime64[D]").astype(np.int64)

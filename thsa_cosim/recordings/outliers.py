@@ -14,6 +14,7 @@ Mask = NDArray[np.bool_]
 CODES = frozenset(
     sign * code
     for code in (
+        *(full / scale for full in (32767.0, 32768.0, 65535.0, 65536.0) for scale in (10.0, 100.0, 1000.0)),
         999.0,
         9999.0,
         99999.0,

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmu_sources.build import HABITS2, habits2, library, write_fmu
+from fmu_sources.build import HABITS2, events2, habits2, library, write_fmu
 
-from thsa_cosim.batch import Experiment, Job, LocalRunner
-from thsa_cosim.check import Finding, Verdict, bench, check_fmu
+from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
+from thsa_cosim.check import Finding, Verdict, bench, budget, check_fmu, numerics
+from thsa_cosim.cli import run_command
 from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu import read_description
 from thsa_cosim.fmu.probe import missing_binary
@@ -137,3 +138,57 @@ def test_backslashes_hide_no_library(tmp_path: Path) -> None:
             info.filename = name.replace("/", "\\")
             target.writestr(info, source.read(name))
     assert missing_binary(read_description(windows)) == ""
+
+
+def test_an_fmu_that_ends_the_simulation_itself_is_tried_until_then() -> None:
+    """The bouncing ball of events2.c terminates at its parameter ``end``."""
+    report = check_fmu(events2(), values={"end": 0.5}, cycles=2)
+    found = {finding.name: finding for finding in report.findings}
+    assert found["runs"].verdict is Verdict.WARNING
+    assert "it ends the simulation itself at t = 0.5 s of" in found["runs"].text
+    assert found["fresh instance"].verdict is Verdict.OK
+
+
+def test_a_library_that_keeps_something_between_instances_is_told_from_one_that_is_random() -> None:
+    found = lines(habits2("KEEPS"))
+    assert found["new process"].verdict is Verdict.OK
+    assert found["fresh instance"].verdict is Verdict.FAILED
+    assert "a new process nothing: the library keeps something" in found["fresh instance"].text
+
+
+def test_a_check_ends_after_its_time_limit_and_names_what_it_left(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["check", str(habits2()), "--time-limit", "1e-6"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert (
+        "1e-06 s are over (--time-limit): not tried are inputs, fresh instance and communication step"
+        in shown
+    )
+    assert "verdict: warning" in shown
+
+
+def test_runs_that_hang_do_not_take_longer_than_a_line_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock that goes on by a deadline of 10 s with every run."""
+    clock = iter(np.arange(0.0, 1e4, 10.0).tolist())
+    monkeypatch.setattr(budget.time, "monotonic", lambda: next(clock))
+    watch = budget.Watch(limit_s=1e9)
+    assert len(list(watch.while_affordable(60))) <= 2 * budget.SECONDS / 10.0 + budget.LEAST
+    monkeypatch.setattr(budget.time, "monotonic", lambda: 0.0)
+    assert list(budget.Watch().while_affordable(60)) == list(range(60))
+
+
+def test_changes_that_fall_with_the_step_are_told_from_those_that_do_not() -> None:
+    """Runs whose error is proportional to their step, and runs that differ at random."""
+
+    def runs(error: list[float]) -> list[tuple[float, Outcome]]:
+        found = []
+        for k, e in enumerate(error):
+            time = np.linspace(0.0, 1.0, 10 * 2**k + 1)
+            found.append((0.1 / 2**k, Outcome(Status.OK, signals=Signals(time, {"y": time * (1.0 + e)}))))
+        return found
+
+    judged = (Verdict.FAILED, "halving 0.2 s changes y by 4.0e-01 of its range", {"change": 0.4})
+    converging = numerics.judge_shorter_steps(judged, runs([0.4, 0.2, 0.1, 0.05]))
+    assert "it falls with the step, but halving 0.025 s still changes" in converging[1]
+    random = numerics.judge_shorter_steps(judged, runs([0.0, 0.5, 0.0, 0.5]))
+    assert "shorter steps change as much: no step is known to be right" in random[1]
+    assert converging[0] is random[0] is Verdict.FAILED

@@ -8,6 +8,7 @@
  * after 0.2345 s. EULER: one explicit step per communication step. SLOW=t: each step takes so many microseconds.
  * OWN_STEP: whole steps of 10 ms, as many as it takes to reach the end, as 20-sim does.
  * NAN_ABOVE=u: y is no number where the input is above u. ALONE: no other instance of any such FMU lives in the process.
+ * KEEPS: each instance of a process starts 0.01 higher than the one before.
  * SETUP_FORGETS: fmi2SetupExperiment overwrites start values.
  */
 #include <math.h>
@@ -62,6 +63,10 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     Model* m = callbacks->allocateMemory(1, sizeof(Model));
     m->callbacks = callbacks;
     start(m);
+#ifdef KEEPS
+    static int before;
+    m->y = 0.01 * before++;
+#endif
     return m;
 }
 void fmi2FreeInstance(fmi2Component c) {

@@ -1,6 +1,8 @@
 """Identification with an FMU of another tool: what it does with inputs and start values is found out first."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +10,6 @@ import pytest
 from fmu_sources import build
 
 from tests.fmu.test_plant import lag
-from thsa_cosim.cli import run_command
 
 SCENARIO = """
 kind = "identify"
@@ -50,7 +51,8 @@ generations = 12
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
+def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+    """The study's folder, and the lines that the command wrote to the terminal while it ran."""
     folder = tmp_path_factory.mktemp("foreign")
     time = np.linspace(0.0, 2.0, 401)
     u = np.interp(time, [0.0, 0.2, 0.5, 1.1, 1.5, 2.0], [0.0, 1.0, 1.0, -0.5, 0.2, 0.2])
@@ -59,8 +61,23 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
     np.savetxt(folder / "run.csv", table, delimiter=",", header="t,u,y", comments="", fmt="%.9g")
     fmu = build.lag2("WRONG_SLOPE", "RESET_IN_SETUP", tool="vendor")
     (folder / "s.toml").write_text(SCENARIO.format(fmu=fmu))
-    assert run_command(["identify", str(folder / "s.toml"), "-o", str(folder / "out"), "--quiet"]) == 0
-    found: dict[str, object] = json.loads((Path(folder) / "out" / "result.json").read_text())
+    command = [
+        sys.executable,
+        "-m",
+        "thsa_cosim",
+        "identify",
+        str(folder / "s.toml"),
+        "-o",
+        str(folder / "out"),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder / "out", done.stderr.splitlines()
+
+
+@pytest.fixture(scope="module")
+def result(study: tuple[Path, list[str]]) -> dict[str, object]:
+    found: dict[str, object] = json.loads((study[0] / "result.json").read_text())
     return found
 
 
@@ -75,6 +92,15 @@ def test_the_parameter_that_does_nothing_is_named(result: dict[str, object]) -> 
     notes = result["notes"]
     assert any(note.startswith("at changes no output of the FMU in any recording") for note in notes)  # type: ignore[attr-defined]
     assert not any(note.startswith("tau") for note in notes)  # type: ignore[attr-defined]
+
+
+def test_it_is_named_on_the_terminal_before_the_search(study: tuple[Path, list[str]]) -> None:
+    _, lines = study
+    (named,) = [k for k, line in enumerate(lines) if line.startswith("at changes no output of the FMU")]
+    assert "remove it from [[parameters]]" in lines[named]
+    searching = [k for k, line in enumerate(lines) if "searching" in line]
+    assert searching, lines
+    assert named < min(searching)
 
 
 def test_the_inputs_are_given_in_the_way_that_the_trial_found(result: dict[str, object]) -> None:

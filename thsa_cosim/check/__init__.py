@@ -9,6 +9,7 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from thsa_cosim.check.budget import TOTAL
 from thsa_cosim.check.excitation import Excitation
 from thsa_cosim.check.finding import CheckReport, Finding, Verdict
 from thsa_cosim.check.trials import Trials
@@ -28,6 +29,7 @@ def check_fmu(
     time: FloatArray | None = None,
     excitation: Excitation | None = None,
     deadline_s: float = 30.0,
+    limit_s: float = TOTAL,
     cycles: int = 50,
     on_finding: Callable[[Finding], None] | None = None,
 ) -> CheckReport:
@@ -44,6 +46,8 @@ def check_fmu(
         All of these and more (duration, step, interface); wins over them.
     deadline_s
         Wall time after which a run is killed, s.
+    limit_s
+        Wall time after which no further line is begun, s; a line says what was not tried.
     cycles
         Runs over which memory and file handles are watched.
     on_finding
@@ -58,15 +62,10 @@ def check_fmu(
     description = read_description(path)
     given = excitation or Excitation(dict(values or {}), inputs=inputs, time=time)
     _check_names(description, given)
-    trials = Trials(description, given, deadline_s, on_finding)
+    trials = Trials(description, given, deadline_s, on_finding, limit_s)
     trials.description_lines()
     if trials.first_run():
-        trials.inputs_lines()
-        runs_changed = trials.fresh_lines(cycles)
-        trials.start_value_line()
-        trials.larger_inputs_line()
-        trials.reset_lines(cycles, runs_changed)
-        trials.exchange_line()
+        trials.lines(cycles)
     return CheckReport(description.path, description.sha256, probe.facts(description), tuple(trials.findings))
 
 

@@ -1,5 +1,6 @@
 """What the trials of an FMU share: its excitation, the worker processes, a first run that succeeds."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Literal
@@ -9,7 +10,7 @@ import numpy as np
 from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
 from thsa_cosim.batch.handling import HandlingTrial, try_input_handling
 from thsa_cosim.check import numerics
-from thsa_cosim.check.budget import LONGEST_RUN, SLOW_SHARES, Budget, is_slow
+from thsa_cosim.check.budget import LONGEST_RUN, SLOW_SHARES, TOTAL, Budget, Watch, is_slow
 from thsa_cosim.check.excitation import Excitation
 from thsa_cosim.check.finding import Finding, Verdict
 from thsa_cosim.fmu import FmuDescription, probe
@@ -23,6 +24,9 @@ _SHORT = 200
 """Communication points of a run that is repeated to watch memory."""
 _CYCLES = 50
 _LONG = 3000
+_FEWEST = 10
+"""Communication points before an FMU ends the simulation itself, below which nothing can be tried."""
+_ENDED = re.compile(r"ended the simulation at t = (\S+) s")
 _BY_INPUTS = (Status.NOT_FINITE, Status.FMI_ERROR, Status.FMI_DISCARD, Status.INCOMPLETE)
 """How a run may fail because its inputs ask too much."""
 
@@ -36,7 +40,9 @@ class Bench:
         excitation: Excitation,
         deadline_s: float,
         on_finding: Callable[[Finding], None] | None,
+        limit_s: float = TOTAL,
     ) -> None:
+        self._watch = Watch(limit_s)
         self._description = description
         self._given = excitation
         self._values = dict(excitation.values)
@@ -54,6 +60,7 @@ class Bench:
         self._halves = True
         self._budget = Budget()
         self._rests = False
+        self._runs_changed = False
         self._slowness = ""
         self._cut = False
         self._changed = {
@@ -127,6 +134,17 @@ class Bench:
             recycle_growth_mb=1e6,
         )
 
+    def _many(
+        self, runner: LocalRunner, jobs: Sequence[Job], *, stop_at_failure: bool = False
+    ) -> list[Outcome]:
+        """Outcomes of ``jobs`` one after the other; fewer where they take longer than a line may."""
+        outcomes: list[Outcome] = []
+        for k in self._watch.while_affordable(len(jobs)):
+            outcomes += runner.run([jobs[k]])
+            if stop_at_failure and not outcomes[-1].ok:
+                break
+        return outcomes
+
     def _short_runs(self, cycles: int) -> int:
         return self._budget.runs(_WARM_UP + cycles, self._short_points())
 
@@ -155,7 +173,23 @@ class Bench:
             outcome, doubt = self._fall_back(outcome)
         if not outcome.ok and outcome.status in _BY_INPUTS:
             outcome, doubt = self._at_rest(outcome)
+        if outcome.status is Status.INCOMPLETE:
+            outcome, doubt = self._until_it_ends(outcome)
         return outcome, doubt
+
+    def _until_it_ends(self, failed: Outcome) -> tuple[Outcome, str]:
+        """Try an FMU that ends the simulation itself (terminateSimulation, fmi2Terminated) up to that time."""
+        found = _ENDED.search(failed.reason)
+        before = self._time[self._time <= float(found[1])] if found else self._time[:0]
+        if len(before) < _FEWEST:
+            return failed, ""
+        whole = self._time
+        self._shorten(before)
+        outcome = self._try()
+        if not outcome.ok:
+            self._shorten(whole)
+            return failed, ""
+        return outcome, f"; it ends the simulation itself at t = {before[-1]:g} s of {whole[-1]:g} s"
 
     def _at_rest(self, failed: Outcome) -> tuple[Outcome, str]:
         """Hold inputs of which nobody said where they run: does it fail because of them?"""

@@ -1,11 +1,15 @@
 """How much of a trial a slow FMU is given: each kind of repeated run ends within a given time."""
 
-from dataclasses import dataclass
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
 SECONDS = 20.0
 """Wall time that each line of repeated runs may take."""
+TOTAL = 300.0
+"""Wall time [s] after which a check begins no further line."""
 LEAST = 3
 """Runs that are made however long they take."""
 SLOW_SHARES = (1 / 8, 1 / 64, 1 / 512)
@@ -35,3 +39,27 @@ class Budget:
 def is_slow(duration_s: float, share: float, deadline_s: float) -> bool:
     """Whether a run cut to ``share`` took so long that all of it may outlast the deadline; else it hangs later."""
     return duration_s > 0.3 * share * deadline_s
+
+
+@dataclass(frozen=True)
+class Watch:
+    """How long a check may take: ``limit_s`` [s] of wall time since the watch was made."""
+
+    limit_s: float = TOTAL
+    start: float = field(default_factory=time.monotonic)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing more is begun."""
+        return time.monotonic() - self.start > self.limit_s
+
+    def while_affordable(self, count: int) -> Iterator[int]:
+        """Yield 0, 1, ... ``count`` - 1; at least ``LEAST``, then as long as a line of repeated runs may take.
+
+        Runs that hang last until the deadline, whatever the first one took.
+        """
+        begin = time.monotonic()
+        for k in range(count):
+            if k >= LEAST and (time.monotonic() - begin > 2.0 * SECONDS or self.is_over):
+                return
+            yield k

@@ -18,6 +18,8 @@ STEP_FAILED = 0.1
 """Above this change a step is wrong even where a shorter one would do."""
 AGREE = 1e-3
 """Deviation between ways of simulating the same that still counts as agreement."""
+_FALLS = 0.6
+"""Share of the first halving's change below which that of the last one tried is a convergence."""
 _FAR = 20.0
 """Ranges of an output over the rest of a run, by which its first value is no value."""
 Judged = tuple[Verdict, str, dict[str, float]]
@@ -48,7 +50,7 @@ def judge_step(
         if fixed:
             text = f"it takes steps of {step:g} s only, as it declares: what they cost in accuracy cannot be tried"
             return Verdict.NOT_TRIED, text, {}
-        refused = outcome.status in (Status.FMI_ERROR, Status.FMI_DISCARD)
+        refused = outcome.status in (Status.FMI_ERROR, Status.FMI_DISCARD, Status.INCOMPLETE)
         if refused and "t = 0 s" in outcome.reason:
             text = f"it declares steps of any size, and refuses half of {step:g} s: {outcome.reason}"
             return Verdict.WARNING, text, {}
@@ -79,6 +81,7 @@ def judge_shorter_steps(judged: Judged, runs: Sequence[tuple[float, Outcome]]) -
     ``runs``: (step, outcome), each half of the one before, the first one being half of what was judged.
     """
     verdict, text, values = judged
+    last = 0.0, np.inf
     for (step, coarse), (_, fine) in pairwise(runs):
         if coarse.signals is None or fine.signals is None:
             break
@@ -87,6 +90,10 @@ def judge_shorter_steps(judged: Judged, runs: Sequence[tuple[float, Outcome]]) -
             mild = values.get("change", np.inf) <= STEP_FAILED
             text = f"{text}; halving {step:g} s changes {change:.1e}: use that step"
             return Verdict.WARNING if mild else verdict, text, {**values, "usable_step_s": step}
+        last = step, change
+    if last[1] < _FALLS * values.get("change", 0.0):
+        text = f"{text}; it falls with the step, but halving {last[0]:g} s still changes {last[1]:.1e}"
+        return verdict, f"{text}: use a shorter one", values
     return verdict, f"{text}, and shorter steps change as much: no step is known to be right", values
 
 

@@ -1,10 +1,10 @@
 """The trials of a check. Every one runs through ``batch``: an FMU that crashes, hangs or floods costs lines only."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import numpy as np
 
-from thsa_cosim.batch import Job, Outcome
+from thsa_cosim.batch import Job, LocalRunner, Outcome
 from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined
 from thsa_cosim.batch.own_step import moves_within
 from thsa_cosim.check import coupling, numerics
@@ -89,6 +89,23 @@ class Trials(Bench):
         )
         return True
 
+    def lines(self, cycles: int) -> None:
+        """Try one line after the other, until the time for the whole check is over."""
+        left: dict[str, Callable[[], object]] = {
+            "inputs": self.inputs_lines,
+            "fresh instance and communication step": lambda: self.fresh_lines(cycles),
+            "start values": self.start_value_line,
+            "larger inputs": self.larger_inputs_line,
+            "reset": lambda: self.reset_lines(cycles),
+            "model exchange": self.exchange_line,
+        }
+        for name in tuple(left):
+            if self._watch.is_over:
+                text = f"{self._watch.limit_s:g} s are over (--time-limit): not tried are {', '.join(left)}"
+                self._note("time", Verdict.WARNING, text)
+                return
+            left.pop(name)()
+
     def _whose_duration(self) -> str:
         stop = self._description.default_experiment.stop
         given = self._given.duration is not None or self._given.time is not None
@@ -123,10 +140,10 @@ class Trials(Bench):
         alone = [self._experiment("none", self._time, self._still())]
         alone += [self._experiment(f"input {n}", self._time, self._excited(only=n)) for n in names]
         with self._runner(more=alone) as runner:
-            outcomes = runner.run([Job(e.name) for e in alone])
+            outcomes = self._many(runner, [Job(e.name) for e in alone])
         if outcomes[0].signals is not None:
-            changed = dict(zip(names, outcomes[1:], strict=True))
-            untried = len(every) - len(names)
+            changed = dict(zip(names, outcomes[1:], strict=False))
+            untried = len(every) - len(changed)
             judged = numerics.judge_changes(outcomes[0].signals, changed, "inputs", untried)
             self._take("each input", judged)
 
@@ -149,18 +166,19 @@ class Trials(Bench):
         }
         with self._runner(backend=None if many else "python") as runner:
             jobs = [Job("trial", declared), *(Job("trial", {n: v}) for n, v in tried.items())]
-            as_declared, *outcomes = runner.run(
-                jobs
-            )  # the first in its process, as the one it is compared with
-        repeats = any(f.name == "new process" and f.verdict is Verdict.OK for f in self.findings)
-        if repeats and (judged := numerics.judge_declared(self._first, as_declared)) is not None:
+            # The first in its process, as the one it is compared with.
+            as_declared, *outcomes = self._many(runner, jobs)
+        if (
+            self._is_ok("new process")
+            and (judged := numerics.judge_declared(self._first, as_declared)) is not None
+        ):
             self._take("declared values", judged)
-        found = dict(zip(tried, outcomes, strict=True))
-        untried = sum(n in changed for n in named[most:])
+        found = dict(zip(tried, outcomes, strict=False))
+        untried = sum(n in changed for n in named[most:]) + len(tried) - len(found)
         self._take(name, numerics.judge_changes(self._first, found, "start values", untried))
 
-    def fresh_lines(self, cycles: int) -> bool:
-        """Use a new instance per run; return whether the FMU runs with other start values."""
+    def fresh_lines(self, cycles: int) -> None:
+        """Use a new instance per run; find out whether the FMU runs with other start values."""
         with self._runner() as runner:
             first, second, halved, doubled = runner.run(
                 [Job("trial"), Job("trial"), Job("halved"), Job("doubled")]
@@ -177,10 +195,10 @@ class Trials(Bench):
                 for name in ("memory over instances", "file handles over instances"):
                     self._note(name, Verdict.NOT_TRIED, "there is one instance per process")
             else:
-                self._leak_lines("instances", runner.run([Job("short")] * self._short_runs(cycles)))
-            return runner.run([Job("trial", self._changed)])[0].ok
+                self._leak_lines("instances", runner, cycles)
+            self._runs_changed = runner.run([Job("trial", self._changed)])[0].ok
 
-    def reset_lines(self, cycles: int, runs_changed: bool) -> None:
+    def reset_lines(self, cycles: int) -> None:
         """Use one instance, reset before each run."""
         if self._description.fmi_version == "1.0":
             self._note("reset", Verdict.NOT_TRIED, "FMI 1.0 instances are not reset")
@@ -189,13 +207,13 @@ class Trials(Bench):
             second = runner.run([Job("trial"), Job("trial")])[1]
             self._compare("reset", second, "a second run after reset")
             name = "reset of start values"
-            if self._changed and runs_changed:
+            if self._changed and self._runs_changed:
                 after = runner.run([Job("trial", self._changed), Job("trial")])[1]
                 self._compare(name, after, "a run after one with other start values and reset")
             else:
                 why = "it does not run with other start values" if self._changed else "it has none to change"
                 self._note(name, Verdict.NOT_TRIED, why)
-            self._leak_lines("resets", runner.run([Job("short")] * self._short_runs(cycles)))
+            self._leak_lines("resets", runner, cycles)
 
     def _step_lines(self, halved: Outcome, doubled: Outcome) -> None:
         name = "communication step"
@@ -296,7 +314,8 @@ class Trials(Bench):
             outcome = runner.run([Job("trial")])[0]
         self._take(name, numerics.judge_exchange(self._first, outcome))
 
-    def _leak_lines(self, way: str, outcomes: Sequence[Outcome]) -> None:
+    def _leak_lines(self, way: str, runner: LocalRunner, cycles: int) -> None:
+        outcomes = self._many(runner, [Job("short")] * self._short_runs(cycles), stop_at_failure=True)
         memory, files = f"memory over {way}", f"file handles over {way}"
         failed = next((outcome for outcome in outcomes if not outcome.ok), None)
         if failed is not None:
@@ -326,4 +345,12 @@ class Trials(Bench):
             return
         change, worst = largest_change(self._first.values, found)
         verdict = Verdict.WARNING if change < 1e-9 else Verdict.FAILED
-        self._note(name, verdict, f"{what} changes {worst} by {change:.1e} of its range", change=change)
+        text = f"{what} changes {worst} by {change:.1e} of its range"
+        if name == "fresh instance" and self._is_ok("new process"):
+            text += ", a new process nothing: the library keeps something (static variables, random numbers)"
+        elif name == "new process":
+            text += ": it does not repeat itself (random numbers, or memory that is not set)"
+        self._note(name, verdict, text, change=change)
+
+    def _is_ok(self, name: str) -> bool:
+        return any(f.name == name and f.verdict is Verdict.OK for f in self.findings)

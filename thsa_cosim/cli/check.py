@@ -37,6 +37,13 @@ FAILED = 3
     "--deadline", type=POSITIVE, default=30.0, show_default=True, help="FMU: longest time of a run, s."
 )
 @click.option(
+    "--time-limit",
+    type=POSITIVE,
+    default=300.0,
+    show_default=True,
+    help="FMU: wall time after which no further trial begins, s; what was not tried is named.",
+)
+@click.option(
     "--start", "starts", multiple=True, metavar="NAME=VALUE", help="FMU: a start value, a number or a text."
 )
 @click.option("--input", "ends", multiple=True, metavar="NAME=VALUE", help="FMU: final value of an input.")
@@ -55,6 +62,7 @@ def check(
     duration: float | None,
     step: float | None,
     deadline: float,
+    time_limit: float,
     starts: tuple[str, ...],
     ends: tuple[str, ...],
     sensitivity: bool,
@@ -73,7 +81,8 @@ def check(
     values, texts = _start_values(path, starts)
     given = {"duration": duration, "step": step, "values": values, "texts": texts, "ends": _pairs(ends)}
     points = _sensitivities(path) if sensitivity else ()
-    content, show = _checked(path, given, deadline)
+    limits = {"deadline_s": deadline, "limit_s": time_limit}
+    content, show = _checked(path, given, limits)
     if points:
         content, show = _with_sensitivities(points, content, show)
     text = json.dumps(content, indent=2)
@@ -112,32 +121,44 @@ def _pairs(texts: tuple[str, ...]) -> dict[str, float]:
     return pairs
 
 
-def _checked(path: Path, given: Mapping[str, Any], deadline: float) -> Checked:
+def _checked(path: Path, given: Mapping[str, Any], limits: Mapping[str, float]) -> Checked:
     from thsa_cosim.recordings import SUFFIXES
 
     if path.suffix.lower() == ".toml":
-        return _scenario(path, deadline)
-    return _recording(path) if path.suffix.lower() in SUFFIXES else _fmu(path, given, deadline)
+        return _scenario(path, limits)
+    return _recording(path) if path.suffix.lower() in SUFFIXES else _fmu(path, given, limits)
 
 
-def _fmu(path: Path, given: Mapping[str, Any], deadline: float) -> Checked:
+def _fmu(path: Path, given: Mapping[str, Any], limits: Mapping[str, float]) -> Checked:
     from thsa_cosim.check import Excitation, check_fmu
     from thsa_cosim.report.check import print_check
 
     with _trying(path) as on_finding:
-        report = check_fmu(path, excitation=Excitation(**given), deadline_s=deadline, on_finding=on_finding)
+        report = check_fmu(
+            path,
+            excitation=Excitation(**given),
+            deadline_s=limits["deadline_s"],
+            limit_s=limits["limit_s"],
+            on_finding=on_finding,
+        )
     return {"kind": "fmu", **report.to_dict()}, lambda out: print_check(out, report)
 
 
 @contextmanager
 def _trying(path: Path) -> "Iterator[Callable[[Finding], None] | None]":
-    """On a terminal, say what was tried last: a slow FMU takes minutes."""
+    """On a terminal, say what was tried last, and the time since the begin: a slow FMU takes minutes."""
     out = console(stderr=True)
     if not out.is_terminal:
         yield None
         return
-    with out.status(f"trying {path.name}") as status:
-        yield lambda finding: status.update(f"trying {path.name}: {finding.name} {finding.verdict}")
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=out, transient=True) as bar:
+        task = bar.add_task(f"trying {path.name}", total=None)
+        yield lambda finding: bar.update(
+            task, description=f"trying {path.name}: {finding.name} {finding.verdict}"
+        )
 
 
 def _recording(path: Path) -> Checked:
@@ -148,7 +169,7 @@ def _recording(path: Path) -> Checked:
     return report.to_dict(), lambda out: print_file(out, report)
 
 
-def _scenario(path: Path, deadline: float) -> Checked:
+def _scenario(path: Path, limits: Mapping[str, float]) -> Checked:
     """A scenario loads, or says in one sentence why not; then its data and its FMU."""
     from thsa_cosim.inspection import Inspection
     from thsa_cosim.report.check import print_check
@@ -162,7 +183,8 @@ def _scenario(path: Path, deadline: float) -> Checked:
     of_recordings = [s.data for s in scenarios]
     findings = tuple(f for data in of_recordings for f in data.findings)
     data = Inspection.of(findings, tuple(s for data in of_recordings for s in data.repairs))
-    report = _fmu_of(loaded, deadline)
+    with _trying(path) as on_finding:
+        report = _fmu_of(loaded, limits, on_finding)
     verdict = max(
         {"good": "ok", "usable": "warning", "bad": "failed"}[data.verdict], str(report.verdict), key=_WORSE
     )
@@ -213,7 +235,11 @@ def _with_sensitivities(
     return {**content, "sensitivity": sensitivity_dict(points)}, shown
 
 
-def _fmu_of(loaded: "Scenario | StagedScenario | TuneScenario", deadline: float) -> "CheckReport":
+def _fmu_of(
+    loaded: "Scenario | StagedScenario | TuneScenario",
+    limits: Mapping[str, float],
+    on_finding: "Callable[[Finding], None] | None",
+) -> "CheckReport":
     """Try the FMU of a scenario with its own excitation: the first recording to fit, or the first condition."""
     from thsa_cosim.check import Excitation, check_fmu
     from thsa_cosim.identify.problem import build_point
@@ -252,6 +278,8 @@ def _fmu_of(loaded: "Scenario | StagedScenario | TuneScenario", deadline: float)
             kind=spec.interface,
             input_mode=spec.inputs,
         ),
-        deadline_s=min(spec.deadline, deadline),
+        deadline_s=min(spec.deadline, limits["deadline_s"]),
+        limit_s=limits["limit_s"],
         cycles=20,
+        on_finding=on_finding,
     )

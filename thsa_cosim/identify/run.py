@@ -145,8 +145,10 @@ class _Search:
 
     def try_parameters(self, engine: Engine) -> None:
         """Name the parameters that do nothing, before any search."""
-        first = self._points[0]
+        first, step = self._points[0], engine.step
+        engine.step = "trying each parameter"
         silent = silent_parameters(first, lambda request: engine.ask(first, request))
+        engine.step = step
         if silent:
             sentences = note_on(silent)
             self.note(sentences)

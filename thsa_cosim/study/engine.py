@@ -159,7 +159,7 @@ class Engine:
         self._runner = runner
         self._journal = journal
         self._on_progress = on_progress
-        self._step = step
+        self.step = step
         self._failed: Counter[tuple[str, str]] = Counter()
         self._numbers: Counter[str] = Counter()
         self._spent: Counter[str] = Counter()
@@ -202,7 +202,7 @@ class Engine:
         if self._on_progress is not None:
             failed, best = sum(self._failed.values()), dict(self._best)
             self._on_progress(
-                Progress(self._step, self.runs, self.planned, self.reused, failed, best, self._generation)
+                Progress(self.step, self.runs, self.planned, self.reused, failed, best, self._generation)
             )
 
     # -- requests -------------------------------------------------------------------------------------

@@ -228,7 +228,8 @@ def _round(
     if whole and proposals and selection.is_open(scored):
         further = selection.further(proposals)
         scored = selection.refined_further(scored, proposals, further, limit)
-        scored = selection.at_sizes(scored, proposals)
+        if not accepted:  # the first effect leaves the next ones a model that is led less far astray
+            scored = selection.at_sizes(scored, proposals)
         proposals = sorted([*proposals, *further], key=lambda p: -p.gain)
         gains = largest_gains(selection.current, proposals, seed)
         limit = threshold(gains)

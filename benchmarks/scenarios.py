@@ -50,7 +50,7 @@ def study(root: Path, name: str, folder: Path) -> tuple[dict[str, Any], float]:
     """
     scenario = root / "scenarios" / f"{name}.toml"
     if not (folder / "result.json").is_file():
-        data = ["--fit", EMPS, "--validate", EMPS] if name == "emps" else []
+        data = ["--fit", EMPS] if name == "emps" else []
         command = [
             sys.executable, "-c", "from thsa_cosim.cli import main; main()",
             kind(scenario), scenario, *data, "--output", folder, "--workers", "1", "--no-report", "--quiet",

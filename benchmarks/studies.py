@@ -76,7 +76,7 @@ def one(name: str, folder: Path) -> dict[str, Any]:
         for module, function in places:
             _clocked(module, function, part, spent)
     runs = _counted()
-    data = ["--fit", str(EMPS), "--validate", str(EMPS)] if name == "emps" else []
+    data = ["--fit", str(EMPS)] if name == "emps" else []
     code = run_command(
         [
             command(name),

@@ -32,7 +32,7 @@ def diagnosed(
     return found
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def windage() -> Attribution:
     return diagnosed(WINDAGE)
 
@@ -80,7 +80,7 @@ def test_the_search_starts_where_it_is_told_to_and_repeats_itself():
     assert found.rounds[0].threshold == limits[0] != limits[1]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def stribeck() -> Attribution:
     return diagnosed(STRIBECK)
 

@@ -77,6 +77,12 @@ def test_with_the_part_open_the_errors_are_those_of_the_fit_with_it(spread: floa
     np.testing.assert_allclose(np.hypot(own, widening(parts, fit)), expected[:2], rtol=0.02)
 
 
+def test_of_a_part_that_nothing_bounds_its_range_is_all_that_is_known() -> None:
+    """Neither recordings nor drawing say how large it is: a uniform distribution over its range, (b - a) / sqrt(12)."""
+    (part,) = hidden_parts(found(fitted(np.inf), "scales"))
+    assert abs(part.size) == pytest.approx(40.0 / np.sqrt(12.0))
+
+
 def test_a_note_says_what_the_parameter_would_be_and_that_it_is_to_be_measured_apart() -> None:
     fit = fitted(SPREAD)
     (part,) = hidden_parts(found(fit, "scales"))

@@ -29,7 +29,7 @@ def run(amplitude: float, windup: float = 0.0) -> Signals:
     return Signals(TIME, z)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def machine() -> Machine:
     return machine_of(SLOTS, {"a": run(8e-3), "b": run(16e-3, windup=1e-4)})
 

@@ -100,7 +100,8 @@ def selection(monkeypatch: pytest.MonkeyPatch) -> Selection:
     """A round whose candidates are fitted already."""
     monkeypatch.setattr(room, "polish", lambda bench, one, current, held: one)
     monkeypatch.setattr(room, "go_on", lambda bench, one, current, held: one)
-    bench: Any = SimpleNamespace(of=lambda part: TRIALS)
+    roles = {"fit": TRIALS, "validate": TRIALS}
+    bench: Any = SimpleNamespace(of=roles.__getitem__)
     weights: Any = SimpleNamespace(base_held=HELD, plain=lambda residual, part: residual, left=lambda _: 1.0)
     current: Any = SimpleNamespace(residual=HELD)
     return Selection(bench, weights, current, HELD)

@@ -85,7 +85,7 @@ def test_power_counts_and_not_amplitude():
     assert wave_numbers([POSITION], [[now_and_then + ripple(37.0, 1.5) + 0.3 * NOISE]], GRID, 1) == (24.0,)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def found() -> Any:
     """A motor and a nut 0.01 times as far, a ripple of the motor in the current and one along the path in the speed."""
     path = 1e-2 * POSITION

@@ -403,7 +403,7 @@ def test_missing_scenario_file_and_folder(folder):
         ScenarioError, match=r"no such scenario file; check the path\. Did you mean 'small\.toml'"
     ):
         load(folder / "smal.toml")
-    with pytest.raises(ScenarioError, match="cannot be read"):
+    with pytest.raises(ScenarioError, match=r"is a folder; name a scenario file.*small\.toml"):
         load(folder)
     with pytest.raises(ScenarioError, match="cannot be read"):
         load("nul\0.toml")

@@ -41,7 +41,8 @@ def keep_finished(
     """Keep the end of a study whose files are written; ``words``: all that is shown and asks nothing."""
     from rich.console import Console
 
-    out = Console(file=StringIO(), width=WIDTH, color_system=None, force_terminal=False)
+    # In a notebook, a console shows what it prints, whatever its file.
+    out = Console(file=StringIO(), width=WIDTH, color_system=None, force_terminal=False, force_jupyter=False)
     show(out)
     content = {
         "result": digest_of_file(folder / RESULT),

@@ -10,7 +10,7 @@ from itertools import zip_longest
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
-from thsa_cosim.diagnosis.choosing.forms import best_form
+from thsa_cosim.diagnosis.choosing.forms import best_form, rivals_forms
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, SMALLEST_STRUCTURE, out_of_range
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine
 from thsa_cosim.diagnosis.choosing.ripples import freed, on_orders
@@ -238,6 +238,7 @@ def _round(
     forms: tuple[Scored, ...] = ()
     if choice is not None and whole:
         first = choice
+        scored += rivals_forms(selection, choice, scored, proposals, offered)
         choice = selection.overtaking(choice, scored) or choice
         choice, forms = best_form(selection, choice, scored, proposals, offered)
         if choice is not first:

@@ -12,15 +12,12 @@ from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine, Order, nam
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit
-from thsa_cosim.diagnosis.fitting.unknowns import Unknown
+from thsa_cosim.diagnosis.fitting.unknowns import FAR, Unknown
 from thsa_cosim.diagnosis.results import FoundEffect, Judged, KnownEffect, Value
 from thsa_cosim.signals import FloatArray
 
 #: An error above this share of its value leaves it open; one above this share of the drawing's is the drawing's.
 CLEAR, NO_MORE = 1.0 / 3.0, 0.95
-#: A declared parameter so many spreads from the drawing is a finding of its own: a brake that drags, a weak magnet
-#: (set while looking at a simulated unit whose brake drags).
-FAR = 5.0
 #: What would not be seen at this many times its ordinary size cannot be tested.
 HUGE = 10.0
 

@@ -44,6 +44,32 @@ def best_form(
     return best, tuple(alike)
 
 
+def rivals_forms(
+    selection: Selection,
+    choice: Scored,
+    scored: Sequence[Scored],
+    proposals: Sequence[Proposal],
+    offered: Sequence[Candidate],
+) -> list[Scored]:
+    """The best form of every other effect that explains nearly as much as ``choice``, where that is a new fit.
+
+    An effect is no rival by its formula: it is told apart only where its best form is.
+    """
+    near: dict[str, Scored] = {}
+    for other in scored:
+        if other.held_out_gain >= RIVAL_SHARE * choice.held_out_gain:
+            near.setdefault(other.candidate.name, other)
+    found = []
+    for name, other in near.items():
+        has_forms = any(c.variant.instead and _is_form(c, other.candidate) for c in offered)
+        if name == choice.candidate.name or not (has_forms or other.candidate.variant.instead):
+            continue
+        best, _ = best_form(selection, selection.polished(other), scored, proposals, offered)
+        if best.proposal is not other.proposal:
+            found.append(best)
+    return found
+
+
 def _polished(selection: Selection, one: Scored, choice: Scored) -> Scored:
     """``one`` with all parameters fitted, from the optimum of ``choice`` where it may be a wider form of its block."""
     if one.candidate.component != choice.candidate.component:

@@ -135,7 +135,8 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scor
     unknowns = choice.fit.unknowns
     drawing = np.where([u.declared for u in unknowns.members], unknowns.start, choice.fit.vector)
     fits = [refine(bench, unknowns, choice.fit.vector, steps=choice.fit.steps)]
-    if fits[0] is None or fits[0].misfit > ENOUGH * fits[0].residual.size:
+    off = fits[0] is not None and unknowns.is_far(fits[0].vector)
+    if fits[0] is None or off or fits[0].misfit > ENOUGH * fits[0].residual.size:
         fits.append(refine(bench, unknowns, drawing))
     best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)
     if best is None:

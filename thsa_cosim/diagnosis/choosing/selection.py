@@ -21,10 +21,11 @@ from thsa_cosim.diagnosis.choosing.score import Scored, go_on, polish, score
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.choosing.sizes import at_sizes, is_led_astray
 from thsa_cosim.diagnosis.choosing.starts import PROMISING, further_starts
-from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE, is_visible
+from thsa_cosim.diagnosis.choosing.verdict import VISIBLE, VISIBLE_BESIDE, is_visible
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, errors
+from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
 
@@ -280,7 +281,7 @@ class Selection:
                     continue
                 other = start
             polished = self.polished(other)
-            if self._ties(polished, winner) and not self.fits_better(winner, polished):
+            if self._ties(polished, winner) and not self.is_better(winner, polished):
                 rivals[name] = polished
         return tuple(rivals.values())
 
@@ -292,9 +293,19 @@ class Selection:
             if other.candidate.name != winner.candidate.name
             and other.held_out_gain >= RIVAL_SHARE * winner.held_out_gain
         ]
-        better = [s for s in found if self._ties(s, winner) and self.fits_better(s, winner)]
+        better = [s for s in found if self._ties(s, winner) and self.is_better(s, winner)]
         believed = [s for s in better if not insignificant(s) and not out_of_range(s.fit)]
         return min(believed, key=lambda s: s.fit.cost, default=None)
+
+    def is_better(self, one: Scored, other: Scored) -> bool:
+        """Whether of two that explain the held-out recordings alike the first is the one to believe.
+
+        It fits a recording better; or both fit alike, and only the other one needs a machine far off its drawing.
+        """
+        if self.fits_better(one, other):
+            return True
+        off = other.fit.unknowns.is_far(other.fit.vector) and not one.fit.unknowns.is_far(one.fit.vector)
+        return off and one.fit.cost + SIGMAS**2 < other.fit.cost and not self.fits_better(other, one)
 
     def fits_better(self, one: Scored, other: Scored) -> bool:
         """Whether there is a fit recording in which the second leaves what the first explains, beyond chance."""
@@ -304,10 +315,22 @@ class Selection:
             part = slice(begin, begin := begin + sum(c.measured.size for c in trial.case.channels))
             base, ours, theirs = (f.residual[part] for f in (self.current, one.fit, other.fit))
             lead = block_gains((trial,), theirs, ours)
-            gain = float(base @ base - ours @ ours)
-            if consistency(lead) >= SIGMAS and float(lead.sum()) >= max(APART_SHARE * gain, SIGMAS**2):
+            least = SIGMAS**2
+            if not self._alone_is_noise(trial, part, ours, theirs):
+                least = max(APART_SHARE * float(base @ base - ours @ ours), least)
+            if consistency(lead) >= SIGMAS and float(lead.sum()) >= least:
                 return True
         return False
+
+    def _alone_is_noise(self, trial: Trial, part: slice, ours: FloatArray, theirs: FloatArray) -> bool:
+        """Whether a recording shows nothing of what one fit leaves there, but of what the other does.
+
+        Then what it leaves is the other's misfit, however little beside the gain: the first has none to excuse it.
+        """
+        factors = self.bench.factors("fit")[part]
+        left = (errors((trial,), residual / factors) for residual in (ours, theirs))
+        one, other = (is_visible(found, VISIBLE) for found in left)
+        return other and not one
 
     def polished(self, one: Scored) -> Scored:
         """A candidate fitted with all parameters, once."""

@@ -22,16 +22,16 @@ from thsa_cosim.signals import FloatArray
 SIZES = (10.0, 30.0, 100.0, 300.0, 1000.0)
 #: ... of so many effects and places, those that promise most, of which so many are fitted.
 TRIED, FITTED = 8, 3
-#: Sizes are tried where no fit explains this share of the structure and a declared parameter is so many spreads from
-#: the drawing or at the end of its range, ...
-HARDLY, FAR = 0.5, 5.0
+#: Sizes are tried where no fit explains this share of the structure and a declared parameter is far from the
+#: drawing or at the end of its range, ...
+HARDLY = 0.5
 #: ... and fitted where one of them leaves this share of the squared residuals.
 WORTH = 0.7
 
 
 def is_led_astray(base: Fit, scored: Sequence[Scored]) -> bool:
     """Whether the declared parameters make up for something that no fit of an effect explains."""
-    bent = bool(out_of_range(base)) or bool(np.any(np.abs(base.unknowns.prior(base.vector)) > FAR))
+    bent = bool(out_of_range(base)) or base.unknowns.is_far(base.vector)
     return bent and all(s.share < HARDLY for s in scored)
 
 

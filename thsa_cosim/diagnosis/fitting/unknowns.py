@@ -10,6 +10,10 @@ from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.search import Box
 from thsa_cosim.signals import FloatArray
 
+#: A declared parameter so many spreads from the drawing is a finding of its own: a brake that drags, a weak magnet
+#: (set while looking at a simulated unit whose brake drags).
+FAR = 5.0
+
 
 @dataclass(frozen=True)
 class Unknown:
@@ -73,6 +77,10 @@ class Unknowns:
     def prior(self, vector: FloatArray) -> FloatArray:
         """(n,) deviation of ``vector`` from what is known, in standard deviations."""
         return np.asarray((vector - self.start) * self.precision)
+
+    def is_far(self, vector: FloatArray) -> bool:
+        """Whether a declared parameter of ``vector`` (n,) is more than `FAR` spreads from the drawing."""
+        return bool(np.any(np.abs(self.prior(vector)) > FAR))
 
     def assignments(self, vector: FloatArray, group: str) -> dict[str, float]:
         """FMU start values for a recording of ``group``."""

@@ -1,21 +1,25 @@
 """Does one more recording, planned by the diagnosis, leave no tie?
 
-    python benchmarks/blind_next.py [--units 30] [--seed 1]
+    python benchmarks/blind_next.py [--units 30] [--seed 1] [--jobs 2] [-o FILE.jsonl]
 
 A bench in closed form: a motor with its declared resistance, torque constant, Coulomb and viscous friction, an effect
 at a random place of its range, sensors with white noise. Every unit was recorded too poorly: its speeds lie in a
 narrow band, one way or both, its load hardly changes. Units whose diagnosis ends with a tie are kept until there are
 enough. For each the next experiment is planned within the rig's limits, "recorded" from the true drive, and fitted in
 addition, as `thsa-cosim diagnose --next` and `--with` do. Printed: ties before and after, whether the first name is
-the true one, and what was expected of the profile. Goal: no tie left in 90 %.
+the true one, and what was expected of the profile; of the units without a tie, whether theirs is. Goal: no tie left in
+90 %. With `-o` the file keeps a line a unit, and the same command goes on where it was stopped. The units, and those
+that count, are the same whatever `--jobs` says.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -188,42 +192,131 @@ def ties(found: Attribution) -> tuple[str, tuple[str, ...]]:
     return one.accepted.candidate.effect.name, tuple(r.candidate.effect.name for r in one.rivals)
 
 
+@dataclass(frozen=True)
+class Row:
+    """What became of a unit: names first and tied, before and after the next recording; ``cpu`` in s."""
+
+    number: int
+    effect: str
+    before: list[str]
+    after: list[str]
+    profile: str
+    sigmas: float
+    separates: bool
+    cpu: float
+
+    @property
+    def tied(self) -> bool:
+        """Whether it counts."""
+        return len(self.before) > 1
+
+    @property
+    def settled(self) -> bool:
+        """Whether the next recording left one name."""
+        return len(self.after) == 1
+
+    def __str__(self) -> str:
+        what = f"{self.profile}, {self.sigmas:.0f} sigma" if self.profile else "no profile"
+        return f"{self.effect:24s} {' = '.join(self.before)} -> {' = '.join(self.after) or 'none'}  [{what}]"
+
+
+def tried(seed: int, number: int) -> Row:
+    """One unit from its first diagnosis to the one with the next recording."""
+    begin = time.process_time()
+    unit = Unit(seed * 100_000 + number)
+    found, bench = unit.diagnosed()
+    before = after = _names(found)
+    best = unit.planned(found, bench) if len(before) > 1 else None
+    if best is not None:
+        unit.recordings["fit/next"] = unit.record(best.inputs)
+        after = _names(unit.diagnosed()[0])
+    return Row(
+        number,
+        unit.effect,
+        before,
+        after,
+        "" if best is None else best.name,
+        0.0 if best is None else best.expected**0.5,
+        best is not None and best.separates,
+        round(time.process_time() - begin, 2),
+    )
+
+
+def _names(found: Attribution) -> list[str]:
+    first, rivals = ties(found)
+    return [first, *rivals] if first else []
+
+
+def rows(seed: int, most: int, jobs: int, known: Mapping[int, Row]) -> Iterator[Row]:
+    """One unit after the other, in their order, `jobs` at a time; what is ``known`` is not run again."""
+    with ProcessPoolExecutor(jobs) as pool:
+        for first in range(0, most, 8 * jobs):
+            numbers = range(first, min(most, first + 8 * jobs))
+            asked = {n: pool.submit(tried, seed, n) for n in numbers if n not in known}
+            try:
+                yield from (known[n] if n in known else asked[n].result() for n in numbers)
+            finally:
+                for future in asked.values():
+                    future.cancel()
+
+
+def summary(seen: Sequence[Row]) -> str:
+    """Counts with exact binomial intervals."""
+    tied = [r for r in seen if r.tied]
+    alone = [r for r in seen if len(r.before) == 1]
+    counted = [
+        ("no tie left (goal: 0.90)", [r.settled for r in tied]),
+        ("... and the true one", [r.after == [r.effect] for r in tied]),
+        ("the true one first", [r.after[:1] == [r.effect] for r in tied]),
+        ("no tie where expected", [r.settled for r in tied if r.separates]),
+        ("never tied: the true one", [r.before == [r.effect] for r in alone]),
+    ]
+    lines = []
+    for text, held in counted:
+        if held:
+            interval = binomtest(sum(held), len(held)).proportion_ci(method="exact")
+            lines.append(
+                f"{text:26s} {sum(held)} of {len(held)}  ({interval.low:.2f} .. {interval.high:.2f})"
+            )
+    cpu = sum(r.cpu for r in seen)
+    lines.append(
+        f"{len(seen)} units looked at, {cpu:.0f} CPU s, {cpu / max(1, len(tied)):.1f} CPU s a tied unit"
+    )
+    return "\n".join(lines)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--units", type=int, default=30, help="tied units")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=1, help="units at a time")
+    parser.add_argument("-o", "--output", type=Path, help="file of results to write, or to continue")
     options = parser.parse_args()
-    begin, seed, rows = time.process_time(), 0, []
-    while len(rows) < options.units and seed < 40 * options.units:
-        unit = Unit(options.seed * 100_000 + seed)
-        seed += 1
-        found, bench = unit.diagnosed()
-        name, before = ties(found)
-        if not before:
-            continue
-        best = unit.planned(found, bench)
-        after_name, after = name, before
-        if best is not None:
-            unit.recordings["fit/next"] = unit.record(best.inputs)
-            after_name, after = ties(unit.diagnosed()[0])
-        rows.append((unit.effect, after_name, after, best is not None and best.separates))
-        what = "no profile" if best is None else f"{best.name}, {best.expected**0.5:.0f} sigma"
-        print(
-            f"{len(rows):3d} {unit.effect:24s} {name} = {', '.join(before)} -> {after_name}"
-            f"{' = ' + ', '.join(after) if after else ''}  [{what}]",
-            flush=True,
-        )
-    for text, count in (
-        ("no tie left", sum(bool(name) and not tied for _, name, tied, _ in rows)),
-        ("the true one first", sum(true == name for true, name, _, _ in rows)),
-        ("expected to be separated", sum(separates for *_, separates in rows)),
-        ("... and were", sum(separates and bool(n) and not tied for _, n, tied, separates in rows)),
-    ):
-        interval = binomtest(count, len(rows)).proportion_ci(method="exact")
-        print(f"{text:26s} {count} of {len(rows)}  ({interval.low:.2f} .. {interval.high:.2f})")
-    print(f"{seed} units looked at, {time.process_time() - begin:.0f} CPU s")
+    known: dict[int, Row] = {}
+    if options.output is not None and options.output.exists():
+        head, *lines = options.output.read_text().splitlines()
+        if json.loads(head) != {"seed": options.seed}:
+            parser.error(f"{options.output} was begun with another seed: {head}")
+        known = {r.number: r for r in (Row(**json.loads(line)) for line in lines)}
+    elif options.output is not None:
+        options.output.write_text(json.dumps({"seed": options.seed}) + "\n")
+    seen: list[Row] = []
+    tied = 0
+    for row in rows(options.seed, 60 * options.units, options.jobs, known):
+        seen.append(row)
+        if options.output is not None and row.number not in known:
+            with options.output.open("a") as file:
+                file.write(json.dumps(asdict(row)) + "\n")
+        if row.tied:
+            tied += 1
+            print(f"{tied:3d} of {options.units}  {row}", flush=True)
+        elif len(seen) % 100 == 0:
+            print(f"    {len(seen)} units looked at", flush=True)
+        if tied == options.units:
+            break
+    print(summary(seen))
 
 
 if __name__ == "__main__":

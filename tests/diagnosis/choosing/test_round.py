@@ -23,12 +23,14 @@ class Stages:
         self.asked: dict[str, Any] = {}
         self.better: Any = None
         self.form: Any = None
+        self.others: list[Any] = []
         self.bench = SimpleNamespace(factors=lambda part: np.full(3, {"fit": 2.0}[part]))
         self.current = object()
         monkeypatch.setattr(room, "screen", self.screen)
         monkeypatch.setattr(room, "largest_gains", self.largest_gains)
         monkeypatch.setattr(room, "threshold", lambda gains: float(gains[0]))
         monkeypatch.setattr(room, "best_form", self.best_form)
+        monkeypatch.setattr(room, "rivals_forms", self.rivals_forms)
 
     def proposal(self, effect: str, gain: float) -> Any:
         candidate = SimpleNamespace(effect=SimpleNamespace(name=effect), name=f"{effect}:motor")
@@ -79,6 +81,13 @@ class Stages:
         self.asked["form"] = (choice, list(scored), list(proposals), offered)
         return self.form or choice, (self.two,)
 
+    def rivals_forms(
+        self, selection: Any, choice: Any, scored: Any, proposals: Any, offered: Any
+    ) -> list[Any]:
+        assert selection is self
+        self.asked["rivals_forms"] = (choice, list(scored), list(proposals), offered)
+        return list(self.others)
+
     def elsewhere(self, choice: Any, scored: Any, proposals: Any) -> list[Any]:
         self.asked["elsewhere"] = (choice, list(scored), list(proposals))
         return [self.elsewhere_]
@@ -128,6 +137,16 @@ def test_a_round_with_a_fit_that_leaves_nothing_compares_it_with_rivals_and_form
     assert (found.accepted, found.objections) == (s.one, ("why",))
     assert found.scored == (s.one, s.elsewhere_)
     assert (found.rivals, found.forms, found.threshold) == ((s.two,), (s.two,), 20.0)
+
+
+def test_rivals_are_compared_in_their_best_form(monkeypatch: pytest.MonkeyPatch):
+    s = Stages(monkeypatch, is_open=False, choice="one")
+    other = s.scored(s.proposal("b", 4.0))
+    s.others = [other]
+    s.round()
+    assert s.asked["rivals_forms"] == (s.one, [s.one], [s.first, s.second], OFFERED)
+    assert s.asked["overtaking"] == (s.one, [s.one, other])
+    assert other in s.asked["rivals"][1]
 
 
 def test_what_takes_over_comes_first_and_the_others_are_told_why(monkeypatch: pytest.MonkeyPatch):

@@ -89,10 +89,20 @@ def scored(effect: str, left: float, place: str = "motor") -> Any:
         proposal=own,
         candidate=own.candidate,
         validate=validate,
-        fit=SimpleNamespace(residual=validate, cost=float(validate @ validate)),
+        fit=SimpleNamespace(
+            residual=validate,
+            cost=float(validate @ validate),
+            vector=np.zeros(1),
+            unknowns=SimpleNamespace(is_far=lambda _: False),
+        ),
         held_out_gain=gain,
         fit_gain=gain,
     )
+
+
+def left_in_the_fit(own: Any, residual: np.ndarray) -> Any:
+    own.fit.residual, own.fit.cost = residual, float(residual @ residual)
+    return own
 
 
 @pytest.fixture
@@ -101,7 +111,7 @@ def selection(monkeypatch: pytest.MonkeyPatch) -> Selection:
     monkeypatch.setattr(room, "polish", lambda bench, one, current, held: one)
     monkeypatch.setattr(room, "go_on", lambda bench, one, current, held: one)
     roles = {"fit": TRIALS, "validate": TRIALS}
-    bench: Any = SimpleNamespace(of=roles.__getitem__)
+    bench: Any = SimpleNamespace(of=roles.__getitem__, factors=lambda _: np.ones(N))
     weights: Any = SimpleNamespace(base_held=HELD, plain=lambda residual, part: residual, left=lambda _: 1.0)
     current: Any = SimpleNamespace(residual=HELD)
     return Selection(bench, weights, current, HELD)
@@ -250,8 +260,9 @@ def test_what_leaves_as_little_is_a_rival(selection: Selection):
 def test_what_leaves_a_little_more_in_every_block_is_none_unless_it_hardly_matters(selection: Selection):
     winner = scored("a", 0.0)
     # The share of the gain that is left is the square: half a percent is at 0.0707.
-    assert names(selection.rivals(winner, [scored("b", 0.06)], ())) == ["b:motor"]
-    assert names(selection.rivals(winner, [scored("b", 0.09)], ())) == []
+    for left, rivals in ((0.06, ["b:motor"]), (0.09, [])):
+        other = left_in_the_fit(scored("b", left), NOISE)
+        assert names(selection.rivals(winner, [other], ())) == rivals
 
 
 def test_a_rival_that_is_better_than_the_winner_is_a_rival(selection: Selection):
@@ -279,6 +290,51 @@ def test_of_several_that_drive_a_parameter_to_its_end_the_best_one_with_all_para
     assert choice is not None
     assert choice.candidate.name == "b:motor"
     assert [o.split(":")[0] for o in objections] == ["a", "b", "c"]
+
+
+@pytest.mark.parametrize(
+    ("mine", "theirs", "better"),
+    [
+        (0.0, 0.06, True),  # 0.4 % of the gain, but the first leaves noise alone, the other 0.42 of its size
+        (0.0, 0.01, False),  # 0.07 of it: not to be seen
+        (0.06, 0.08, False),  # both are to be seen, and differ little beside the gain
+        (0.06, 0.3, True),  # 9 % of the gain
+    ],
+)
+def test_what_leaves_noise_alone_fits_better_than_what_leaves_a_little_of_a_large_gain(
+    selection: Selection, mine: float, theirs: float, better: bool
+):
+    one, other = (
+        left_in_the_fit(scored(n, 0.0), s * SMOOTH + NOISE) for n, s in (("a", mine), ("b", theirs))
+    )
+    assert selection.fits_better(one, other) is better
+    assert not selection.fits_better(other, one)
+    assert bool(selection.rivals(one, [other], ())) is not better
+
+
+def test_of_two_that_fit_alike_the_one_that_needs_no_machine_far_off_its_drawing_is_believed(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(room, "insignificant", lambda _: "")
+    monkeypatch.setattr(room, "out_of_range", lambda _: "")
+    near, off = scored("a", 0.0), scored("b", 0.0)
+    off.fit.cost += 36.0
+    assert names(selection.rivals(near, [off], ())) == ["b:motor"], "6 spreads in all, none of them far"
+    off.fit.unknowns = SimpleNamespace(is_far=lambda vector: vector is off.fit.vector)
+    assert selection.rivals(near, [off], ()) == ()
+    assert selection.overtaking(off, [off, near]) is near
+    assert selection.overtaking(near, [off, near]) is None
+    near.fit.unknowns = SimpleNamespace(is_far=lambda _: True)
+    assert names(selection.rivals(near, [off], ())) == ["b:motor"], "a brake drags under either"
+    assert selection.overtaking(off, [off, near]) is None
+
+
+def test_what_leaves_structure_is_not_believed_for_its_drawing(selection: Selection):
+    fitting, drawn = scored("a", 0.0), left_in_the_fit(scored("b", 0.0), 0.3 * SMOOTH + NOISE)
+    fitting.fit.unknowns = SimpleNamespace(is_far=lambda _: True)
+    fitting.fit.cost = drawn.fit.cost + 100.0
+    assert not selection.is_better(drawn, fitting)
+    assert selection.is_better(fitting, drawn)
 
 
 def test_a_lead_that_a_few_blocks_decide_is_chance(selection: Selection):

@@ -315,10 +315,9 @@ class Selection:
             part = slice(begin, begin := begin + sum(c.measured.size for c in trial.case.channels))
             base, ours, theirs = (f.residual[part] for f in (self.current, one.fit, other.fit))
             lead = block_gains((trial,), theirs, ours)
-            least = SIGMAS**2
-            if not self._alone_is_noise(trial, part, ours, theirs):
-                least = max(APART_SHARE * float(base @ base - ours @ ours), least)
-            if consistency(lead) >= SIGMAS and float(lead.sum()) >= least:
+            sure = consistency(lead) >= SIGMAS and float(lead.sum()) >= SIGMAS**2
+            large = float(lead.sum()) >= APART_SHARE * float(base @ base - ours @ ours)
+            if sure and (large or self._alone_is_noise(trial, part, ours, theirs)):
                 return True
         return False
 

@@ -213,8 +213,14 @@ def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, 
         if state.cost - min(costs) < OVERRATED * promised:
             shorter = [state.vector + share * (trials[0] - state.vector) for share in SHORTER]
             more = bench.residuals(unknowns, np.array(shorter), "fit")
-            trials, found, dampings = [*trials, *shorter], [*found, *more], [*dampings, *dampings[:1] * len(shorter)]
-            costs += [np.inf if r is None else cost_of(unknowns, v, r) for v, r in zip(shorter, more, strict=True)]
+            trials, found, dampings = (
+                [*trials, *shorter],
+                [*found, *more],
+                [*dampings, *dampings[:1] * len(shorter)],
+            )
+            costs += [
+                np.inf if r is None else cost_of(unknowns, v, r) for v, r in zip(shorter, more, strict=True)
+            ]
         best = int(np.argmin(costs))
         residual = found[best]
         if costs[best] < state.cost and residual is not None:

@@ -14,7 +14,7 @@ from thsa_cosim.fmu.probe import changed_parameters
 from thsa_cosim.system import read_description
 
 ALONE = 1
-"""``recycle_runs`` of a runner that gives every run a process of its own."""
+"""``recycle_runs`` of a runner that gives every run a separate process."""
 
 
 @dataclass(frozen=True)

@@ -200,7 +200,7 @@ class Trials(Bench):
             if self._fault:
                 text = (
                     f"{self._fault}, a new process nothing: the library keeps something (static variables, random"
-                    f" numbers); each run gets a process of its own"
+                    f" numbers); each run gets a separate process"
                 )
                 self._note("fresh instance", Verdict.WARNING, text)
             elif refused:

@@ -51,7 +51,7 @@ def settle(spec: SimulationTable, experiments: Sequence[Experiment]) -> Settled:
     settled = settle_handling(spec, experiments, limits)  # the first trials have shared their processes
     kept = (
         f"The FMU keeps something in its process: {faults[0].fault}, a new process nothing. Every run gets a "
-        f"process of its own, which costs about half a second each."
+        f"separate process, which costs about half a second each."
     )
     return replace(settled, notes=(*settled.notes, kept), limits=limits)
 

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -59,7 +59,7 @@ class Bench:
         self._handling: HandlingTrial | None = None
         self._first = Signals(self._time, {})
         self._halves = True
-        self._fault, self._limits = "", dict[str, int]()
+        self._fault, self._limits = "", dict[str, Any]()
         self._budget = Budget()
         self._rests = False
         self._runs_changed = False

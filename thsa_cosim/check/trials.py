@@ -14,6 +14,7 @@ from thsa_cosim.check.budget import LONGEST_RUN, Budget
 from thsa_cosim.check.finding import Verdict
 from thsa_cosim.fmu import probe
 from thsa_cosim.fmu.inputs import input_modes, is_ours
+from thsa_cosim.fmu.plant import Kind
 from thsa_cosim.signals import FloatArray, Signals
 from thsa_cosim.system.description import SystemDescription
 
@@ -152,8 +153,9 @@ class Trials(Bench):
     def start_value_line(self) -> None:
         """Change one start value after the other: each must change something, compared with a fresh instance."""
         name = "start values"
-        changed = {n: (v,) for n, v in probe.changed_parameters(self._description, zeros=True).items()}
-        changed |= self._given.alternatives
+        usual = probe.changed_parameters(self._description, zeros=True)
+        changed: dict[str, tuple[float, ...]] = {n: (v,) for n, v in usual.items()}
+        changed.update(self._given.alternatives)
         named = self._given.parameters or tuple(n for n in changed if n not in self._values)
         most = self._budget.runs(_ONE_BY_ONE)
         tried = {n: changed[n] for n in named[:most] if n in changed}
@@ -341,7 +343,11 @@ class Trials(Bench):
         usual = self._given.tolerance or self._description.default_experiment.tolerance or _TOLERANCE
         tight = replace(self._experiment("tight", self._time), tolerance=_TIGHTER * usual)
         names = set(self._outputs)
-        for kind, loose in (("co-simulation", self._first), ("model-exchange", exchange)):
+        kinds: tuple[tuple[Kind, Signals], ...] = (
+            ("co-simulation", self._first),
+            ("model-exchange", exchange),
+        )
+        for kind, loose in kinds:
             with self._runner(kind=kind, more=[tight]) as runner:
                 outcome = runner.run([Job("tight")])[0]
             if outcome.signals is None:

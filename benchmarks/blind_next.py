@@ -304,7 +304,7 @@ def main() -> None:
         options.output.write_text(json.dumps({"seed": options.seed}) + "\n")
     seen: list[Row] = []
     tied = 0
-    for row in rows(options.seed, 60 * options.units, options.jobs, known):
+    for row in rows(options.seed, 200 * options.units, options.jobs, known):
         seen.append(row)
         if options.output is not None and row.number not in known:
             with options.output.open("a") as file:

@@ -60,9 +60,10 @@ def rivals_forms(
         if other.held_out_gain >= RIVAL_SHARE * choice.held_out_gain:
             near.setdefault(other.candidate.name, other)
     found = []
-    for name, other in near.items():
+    for other in near.values():
         has_forms = any(c.variant.instead and _is_form(c, other.candidate) for c in offered)
-        if name == choice.candidate.name or not (has_forms or other.candidate.variant.instead):
+        same = other.candidate.effect.name == choice.candidate.effect.name
+        if same or not (has_forms or other.candidate.variant.instead):
             continue
         best, _ = best_form(selection, selection.polished(other), scored, proposals, offered)
         if best.proposal is not other.proposal:

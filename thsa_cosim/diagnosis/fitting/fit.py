@@ -22,9 +22,6 @@ SMALLEST, LARGEST = 1e-7, 0.3
 #: see events that move, and make the outputs more sensitive than they are over a longer way: steps stop short. Both
 #: were set while looking at one simulated unit with stick-slip.
 UNDERRATED, FURTHER = 1.25, (2.0, 4.0, 8.0)
-#: A step that gains less than this share of what it promised is tried at shares of the undamped one: along a bent
-#: valley, as of a drag's exponent and coefficient, damping holds back what is least certain, and the fit creeps.
-OVERRATED, SHORTER = 0.3, (0.5, 0.25, 0.1)
 #: Information (of unknowns each scaled to 1) below which a combination of them is not determined at all.
 DETERMINED = 1e-11
 
@@ -210,17 +207,6 @@ def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, 
             return None, promised, damping
         found = bench.residuals(unknowns, np.array(trials), "fit")
         costs = [np.inf if r is None else cost_of(unknowns, v, r) for v, r in zip(trials, found, strict=True)]
-        if state.cost - min(costs) < OVERRATED * promised:
-            shorter = [state.vector + share * (trials[0] - state.vector) for share in SHORTER]
-            more = bench.residuals(unknowns, np.array(shorter), "fit")
-            trials, found, dampings = (
-                [*trials, *shorter],
-                [*found, *more],
-                [*dampings, *dampings[:1] * len(shorter)],
-            )
-            costs += [
-                np.inf if r is None else cost_of(unknowns, v, r) for v, r in zip(shorter, more, strict=True)
-            ]
         best = int(np.argmin(costs))
         residual = found[best]
         if costs[best] < state.cost and residual is not None:

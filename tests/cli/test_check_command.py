@@ -93,3 +93,14 @@ def test_the_command_and_the_function_have_the_same_limits() -> None:
     own = inspect.signature(check_fmu).parameters
     assert options["deadline"] == own["deadline_s"].default
     assert options["time_limit"] == own["limit_s"].default == TOTAL
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["redundant_failure", "redundant_diagnosis"])
+def test_the_redundant_actuators_scenarios_warn_of_nothing_in_their_fmu(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Failures that the start values put after the end of the recording; an energy balance near zero."""
+    assert run_command(["check", str(ROOT / f"scenarios/{name}.toml"), "--json"]) == 0
+    findings = json.loads(capsys.readouterr().out)["fmu"]["findings"]
+    assert [f for f in findings if f["verdict"] not in ("ok", "not tried")] == []

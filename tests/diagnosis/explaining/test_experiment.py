@@ -107,7 +107,8 @@ def find(monkeypatch: pytest.MonkeyPatch, other: Force, **changed: Any) -> Any:
     def open_runner(_: Any, experiments: Any) -> Any:
         return Rig(experiments, {1.0: mine, 2.0: other}, broken)
 
-    winner = scored("windage", 1.0, np.zeros(TIME.size), changed.pop("own", 1e12))
+    left = changed.pop("left", np.zeros(TIME.size))
+    winner = scored("windage", 1.0, left, changed.pop("own", 1e12))
     rival = scored("stribeck:screw", 2.0, np.full(TIME.size, 0.5), known)
     attribution = SimpleNamespace(
         rounds=(
@@ -209,11 +210,15 @@ def test_one_law_under_two_names_is_separated_by_nothing(monkeypatch: pytest.Mon
 
 
 def test_what_separates_little_of_what_the_effect_does_is_not_counted_on(monkeypatch: pytest.MonkeyPatch):
-    """0.1 A at every sample is many standard deviations, but 2 % of what the effect does."""
+    """0.1 A at every sample is many standard deviations, but 2 % of what the effect does, whose model leaves more."""
     strong: Force = lambda s: 5.0 * np.cos(s.time)  # noqa: E731
-    near = find(monkeypatch, lambda s: 4.9 * np.cos(s.time), mine=strong)
+    near = find(monkeypatch, lambda s: 4.9 * np.cos(s.time), mine=strong, left=np.sin(TIME))
     assert near.expected > 1000.0
     assert not near.separates
+    assert find(monkeypatch, lambda s: 4.9 * np.cos(s.time), mine=strong).separates, (
+        "noise is all that it leaves"
+    )
+    assert not find(monkeypatch, lambda s: 4.99 * np.cos(s.time), mine=strong).separates, "not to be seen"
     assert find(monkeypatch, lambda s: 2.0 * np.cos(s.time), mine=strong).separates
 
 

@@ -15,6 +15,8 @@ from thsa_cosim.signals import FloatArray
 
 #: Mean squared residual, in variances of the noise, above which a fit may have missed the optimum.
 ENOUGH = 1.05
+#: What leaves less than this many times the squares of the noise leaves little beside it.
+LITTLE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,13 +137,18 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scor
     unknowns = choice.fit.unknowns
     drawing = np.where([u.declared for u in unknowns.members], unknowns.start, choice.fit.vector)
     fits = [refine(bench, unknowns, choice.fit.vector, steps=choice.fit.steps)]
-    off = fits[0] is not None and unknowns.is_far(fits[0].vector)
-    if fits[0] is None or off or fits[0].misfit > ENOUGH * fits[0].residual.size:
+    if fits[0] is None or _is_bent(bench, fits[0]) or fits[0].misfit > ENOUGH * fits[0].residual.size:
         fits.append(refine(bench, unknowns, drawing))
     best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)
     if best is None:
         return choice
     return _scored(bench, choice.proposal, best, current, held) or choice
+
+
+def _is_bent(bench: Bench, fit: Fit) -> bool:
+    """Whether a fit that leaves little but noise has declared parameters far from the drawing: it may have crept."""
+    noise = bench.level("fit") ** 2 * fit.residual.size
+    return fit.misfit < LITTLE * noise and fit.unknowns.is_far(fit.vector)
 
 
 def refit(

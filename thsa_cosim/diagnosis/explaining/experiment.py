@@ -15,9 +15,11 @@ from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS
 from thsa_cosim.diagnosis.choosing.score import Scored, fixed_shapes
 from thsa_cosim.diagnosis.choosing.selection import APART_SHARE
+from thsa_cosim.diagnosis.choosing.verdict import SIGNIFICANT, VISIBLE, is_visible
 from thsa_cosim.diagnosis.explaining.design import expected_errors, expected_gain
 from thsa_cosim.diagnosis.explaining.profiles import TRAVEL, Profile, input_range, profiles, travel
 from thsa_cosim.diagnosis.fitting.fit import Fit
+from thsa_cosim.diagnosis.fitting.structure import errors
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.results import SeparatingExperiment, Sharpened
 from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
@@ -101,7 +103,7 @@ class _Plan:
         if len(self.models) == 1:
             return self._sharpest(ran)
         judged = [(self._gaps(r), self._effect(r), r) for r in self._promising(ran)]
-        gaps, effect, best = max(judged, key=lambda one: _worth(min(one[0]), _wanted(one[1])))
+        gaps, effect, best = max(judged, key=lambda one: _worth(min(one[0]), self._wanted(*one[1:])))
         worst = int(np.argmin(gaps))
         names = tuple(m.candidate.name for m in self.models)
         return SeparatingExperiment(
@@ -111,14 +113,15 @@ class _Plan:
             self._present(worst + 1, best.inputs.time.size),
             best.inputs,
             expected=gaps[worst],
-            separates=gaps[worst] >= SAFETY * _wanted(effect),
+            separates=gaps[worst] >= SAFETY * self._wanted(effect, best),
             reached=best.reached,
         )
 
     def _promising(self, ran: Sequence[_Ran]) -> list[_Ran]:
         """The profiles in which the models are farthest apart, absolutely and beside what the effect does there."""
         apart = [min(_distances(r)) for r in ran]
-        beside = [d / _wanted(effect) for d, effect in zip(apart, self._without(ran), strict=True)]
+        without = self._without(ran)
+        beside = [d / self._wanted(effect, r) for d, effect, r in zip(apart, without, ran, strict=True)]
         order = [*np.argsort(-np.array(apart))[:FARTHEST], *np.argsort(-np.array(beside))]
         return [ran[k] for k in dict.fromkeys(map(int, order))][:JUDGED]
 
@@ -287,6 +290,25 @@ class _Plan:
         difference = ran.outputs[0] - self._weighted(signals[0])
         return expected_gain(fit.information[np.ix_(declared, declared)], jacobian[:, declared], difference)
 
+    def _wanted(self, effect: float, ran: _Ran) -> float:
+        """The gap that distinguishes a rival from an accepted effect that does ``effect``, as the decision asks for it.
+
+        Beside a model that leaves noise alone, a gap that is to be seen is enough, however it is spread.
+        """
+        share = max(SIGMAS**2, APART_SHARE * effect)
+        if not self._alone_is_noise():
+            return share
+        samples = ran.inputs.time.size
+        seen = max(VISIBLE**2 * samples, SIGNIFICANT * samples**0.5)
+        return min(
+            share, max(SIGMAS**2, seen * sum(self._factor(c.name) ** 2 for c in self.fit[0].case.channels))
+        )
+
+    def _alone_is_noise(self) -> bool:
+        """Whether nothing is to be seen of what the accepted effect leaves in the fit recordings."""
+        left = self.models[0].fit.residual / self.one.factors
+        return not left.any() or not is_visible(errors(self.fit, left), VISIBLE)
+
     def _present(self, number: int, samples: int) -> float:
         """Distance to a rival on the fit recordings, scaled to ``samples`` of every output."""
         apart = (self.models[0].fit.residual - self.models[number].fit.residual) / self.one.factors
@@ -318,11 +340,6 @@ class _Plan:
                     separates=False, reached=one.reached, sharpens=sharpened,
                 )  # fmt: skip
         return best
-
-
-def _wanted(effect: float) -> float:
-    """The gap that distinguishes a rival from an accepted effect that does ``effect``, as the decision asks for it."""
-    return max(SIGMAS**2, APART_SHARE * effect)
 
 
 def _worth(gap: float, wanted: float) -> tuple[bool, float]:

@@ -92,6 +92,7 @@ def scored(effect: str, left: float, place: str = "motor") -> Any:
         fit=SimpleNamespace(
             residual=validate,
             cost=float(validate @ validate),
+            misfit=float(validate @ validate),
             vector=np.zeros(1),
             unknowns=SimpleNamespace(is_far=lambda _: False),
         ),
@@ -101,7 +102,7 @@ def scored(effect: str, left: float, place: str = "motor") -> Any:
 
 
 def left_in_the_fit(own: Any, residual: np.ndarray) -> Any:
-    own.fit.residual, own.fit.cost = residual, float(residual @ residual)
+    own.fit.residual, own.fit.cost, own.fit.misfit = residual, *[float(residual @ residual)] * 2
     return own
 
 
@@ -111,7 +112,7 @@ def selection(monkeypatch: pytest.MonkeyPatch) -> Selection:
     monkeypatch.setattr(room, "polish", lambda bench, one, current, held: one)
     monkeypatch.setattr(room, "go_on", lambda bench, one, current, held: one)
     roles = {"fit": TRIALS, "validate": TRIALS}
-    bench: Any = SimpleNamespace(of=roles.__getitem__, factors=lambda _: np.ones(N))
+    bench: Any = SimpleNamespace(of=roles.__getitem__, factors=lambda _: np.ones(N), level=lambda _: 1.0)
     weights: Any = SimpleNamespace(base_held=HELD, plain=lambda residual, part: residual, left=lambda _: 1.0)
     current: Any = SimpleNamespace(residual=HELD)
     return Selection(bench, weights, current, HELD)
@@ -324,6 +325,9 @@ def test_of_two_that_fit_alike_the_one_that_needs_no_machine_far_off_its_drawing
     assert selection.rivals(near, [off], ()) == ()
     assert selection.overtaking(off, [off, near]) is near
     assert selection.overtaking(near, [off, near]) is None
+    near.fit.misfit *= 2.5
+    assert names(selection.rivals(near, [off], ())) == ["b:motor"], "what is missing bends the parameters"
+    near.fit.misfit /= 2.5
     near.fit.unknowns = SimpleNamespace(is_far=lambda _: True)
     assert names(selection.rivals(near, [off], ())) == ["b:motor"], "a brake drags under either"
     assert selection.overtaking(off, [off, near]) is None

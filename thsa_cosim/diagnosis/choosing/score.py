@@ -147,8 +147,12 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scor
 
 def _is_bent(bench: Bench, fit: Fit) -> bool:
     """Whether a fit that leaves little but noise has declared parameters far from the drawing: it may have crept."""
-    noise = bench.level("fit") ** 2 * fit.residual.size
-    return fit.misfit < LITTLE * noise and fit.unknowns.is_far(fit.vector)
+    return fit.unknowns.is_far(fit.vector) and leaves_little(bench, fit)
+
+
+def leaves_little(bench: Bench, fit: Fit) -> bool:
+    """Whether a fit leaves little beside the noise, as it is weighed: no further effect bends its parameters."""
+    return fit.misfit < LITTLE * bench.level("fit") ** 2 * fit.residual.size
 
 
 def refit(

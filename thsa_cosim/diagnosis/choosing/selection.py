@@ -17,7 +17,7 @@ from thsa_cosim.diagnosis.choosing.gates import (
     out_of_range,
     signal_share,
 )
-from thsa_cosim.diagnosis.choosing.score import Scored, go_on, polish, score
+from thsa_cosim.diagnosis.choosing.score import Scored, go_on, leaves_little, polish, score
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.choosing.sizes import at_sizes, is_led_astray
 from thsa_cosim.diagnosis.choosing.starts import PROMISING, further_starts
@@ -300,12 +300,15 @@ class Selection:
     def is_better(self, one: Scored, other: Scored) -> bool:
         """Whether of two that explain the held-out recordings alike the first is the one to believe.
 
-        It fits a recording better; or both fit alike, and only the other one needs a machine far off its drawing.
+        It fits a recording better; or both fit alike and leave little but noise, and only the other one needs a machine
+        far off its drawing.
         """
         if self.fits_better(one, other):
             return True
         off = other.fit.unknowns.is_far(other.fit.vector) and not one.fit.unknowns.is_far(one.fit.vector)
-        return off and one.fit.cost + SIGMAS**2 < other.fit.cost and not self.fits_better(other, one)
+        if not off or not all(leaves_little(self.bench, s.fit) for s in (one, other)):
+            return False
+        return one.fit.cost + SIGMAS**2 < other.fit.cost and not self.fits_better(other, one)
 
     def fits_better(self, one: Scored, other: Scored) -> bool:
         """Whether there is a fit recording in which the second leaves what the first explains, beyond chance."""

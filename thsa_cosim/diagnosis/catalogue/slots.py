@@ -23,6 +23,8 @@ INPUTS: Mapping[str, tuple[str, ...]] = {
     "SensorEffect": ("u",),
     "PhaseEffect": ("i_q", "phi"),
 }
+#: Inputs with a default beside these, which a model need not give: passed on as modifiers, an equation would be one too many.
+OPTIONAL: Mapping[str, tuple[str, ...]] = {"VoltageEffect": ("phi",)}
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "FrictionEffect": ("F",),
     "ShaftEffect": ("tau",),

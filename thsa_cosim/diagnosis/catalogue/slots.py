@@ -23,7 +23,7 @@ INPUTS: Mapping[str, tuple[str, ...]] = {
     "SensorEffect": ("u",),
     "PhaseEffect": ("i_q", "phi"),
 }
-#: Inputs with a default beside these, which a model need not give: passed on as modifiers, an equation would be one too many.
+#: Further inputs, with a default, which a model need not give: passed on as modifiers; an equation would be one too many.
 OPTIONAL: Mapping[str, tuple[str, ...]] = {"VoltageEffect": ("phi",)}
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "FrictionEffect": ("F",),

@@ -23,7 +23,7 @@ INPUTS: Mapping[str, tuple[str, ...]] = {
     "SensorEffect": ("u",),
     "PhaseEffect": ("i_q", "phi"),
 }
-#: Further inputs, with a default, which a model need not give: passed on as modifiers; an equation would be one too many.
+#: Further inputs that a model need not give, since they have a default: passed on as modifiers, not as equations.
 OPTIONAL: Mapping[str, tuple[str, ...]] = {"VoltageEffect": ("phi",)}
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "FrictionEffect": ("F",),

@@ -1,7 +1,9 @@
 """How the FMUs of a study are given their inputs: what the scenario fixes, else what a trial finds."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -38,8 +40,9 @@ def settle_handling(spec: SimulationTable, experiments: Sequence[Experiment]) ->
     """
     found: dict[str, HandlingTrial] = {}
     digests: dict[int, str] = {}
+    read = cache(read_description)  # many experiments, one FMU
     for index, experiment in enumerate(experiments):
-        description = _in_question(spec, experiment)
+        description = _in_question(spec, experiment, read)
         if description is None:
             continue
         digests[index] = description.sha256
@@ -61,12 +64,14 @@ def settle_handling(spec: SimulationTable, experiments: Sequence[Experiment]) ->
     return Settled(interface, tuple(modes), tuple(note for note in notes if note))
 
 
-def _in_question(spec: SimulationTable, experiment: Experiment) -> FmuDescription | None:
+def _in_question(
+    spec: SimulationTable, experiment: Experiment, read: Callable[[Path], FmuDescription]
+) -> FmuDescription | None:
     """The FMU's description if there is anything to find out about its inputs."""
     if spec.interface == "model-exchange" or experiment.inputs is None:
         return None
     try:
-        description = read_description(experiment.fmu)
+        description = read(experiment.fmu)
         linear = [
             v for v in input_variables(description, experiment.inputs) if is_linear(experiment.inputs, v)
         ]

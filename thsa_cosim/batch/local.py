@@ -9,15 +9,15 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from thsa_cosim.batch.attempts import Attempt, Batch, fault_of, signal_name
+from thsa_cosim.batch.attempts import Attempt, Batch, fault_of
 from thsa_cosim.batch.frames import Done, Order, Ready, Returned, Setup
 from thsa_cosim.batch.inbox import Inbox, open_inbox
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.outcome import Outcome, Status
-from thsa_cosim.batch.process import Progress, WorkerProcess
+from thsa_cosim.batch.post_mortem import CHANNEL, CLOSED, GARBLED, SILENT, Cause, post_mortem
+from thsa_cosim.batch.process import WorkerProcess
 from thsa_cosim.batch.runner import OnOutcome, check_jobs, wrapper_names
 from thsa_cosim.batch.study import Study
-from thsa_cosim.batch.worker import LOST
 from thsa_cosim.closing import Closing
 from thsa_cosim.errors import ParameterError, StudyError
 from thsa_cosim.fmu.machine import temporary_fault
@@ -32,10 +32,6 @@ _FAILED_STARTS = 3
 _CLOSE_S = 2.0
 _AHEAD_S = 0.02
 _SILENT_TICKS = 60
-_SILENT = (Status.EXIT, "the answer of the worker did not arrive: the FMU spoilt its pipe")
-_GARBLED = (Status.EXIT, "the FMU wrote into the worker's pipe")
-_CLOSED = (Status.EXIT, "the FMU closed the worker's pipe")
-_CHANNEL = (_SILENT, _GARBLED, _CLOSED)
 _AHEAD = 32
 """A worker has at hand what keeps it busy for _AHEAD_S, at most _AHEAD orders."""
 
@@ -255,9 +251,9 @@ class LocalRunner(Closing):
             case Returned(serials=serials):
                 self._returned(worker, serials, batch)
             case None:
-                self._died(worker, batch, None if worker.ends_within(1.0) else _CLOSED)
+                self._died(worker, batch, None if worker.ends_within(1.0) else CLOSED)
             case _:
-                self._died(worker, batch, _GARBLED)
+                self._died(worker, batch, GARBLED)
 
     def _finished(self, worker: WorkerProcess, done: Done, at: float, batch: Batch) -> None:
         worker.assigned.popleft()
@@ -318,7 +314,7 @@ class LocalRunner(Closing):
             # Between two jobs: what it has finished is on its way, or an FMU has spoilt it.
             worker.silent_ticks += 1
             if worker.silent_ticks > _SILENT_TICKS:
-                self._died(worker, batch, _SILENT)
+                self._died(worker, batch, SILENT)
             return
         worker.silent_ticks = 0
         if progress.began is None:
@@ -332,7 +328,7 @@ class LocalRunner(Closing):
             reason = f"the run outgrew {self._memory_limit / 2**20:.0f} MiB and was killed"
             self._died(worker, batch, (Status.MEMORY, reason))
 
-    def _died(self, worker: WorkerProcess, batch: Batch, cause: tuple[Status, str] | None) -> None:
+    def _died(self, worker: WorkerProcess, batch: Batch, cause: Cause | None) -> None:
         """Reap a worker; blame the job in work, if any, and put the others back to the front.
 
         ``cause`` says why the runner itself has had to kill it.
@@ -356,42 +352,20 @@ class LocalRunner(Closing):
                 raise StudyError(f"Worker processes do not start (exit code {code}): {tail or 'no message'}.")
         # A job that began while the runner was killing its predecessor is innocent, and runs again.
         begun = bool(orders) and progress.serial == orders[0].serial
-        if orders and (cause in _CHANNEL or (begun and (cause is None or orders[0].serial == accused))):
+        if orders and (cause in CHANNEL or (begun and (cause is None or orders[0].serial == accused))):
             order = orders.pop(0)
-            attempt = self._post_mortem(worker, code, cause, console, order.experiment)
+            attempt = post_mortem(
+                worker,
+                code,
+                cause,
+                console,
+                experiment=order.experiment,
+                study=self._study,
+                memory_limit=self._memory_limit,
+            )
             batch.ended(batch.index.pop(order.serial), attempt)
         for order in reversed(orders):
             batch.pending.appendleft(batch.index.pop(order.serial))
-
-    def _post_mortem(
-        self,
-        worker: WorkerProcess,
-        code: int,
-        cause: tuple[Status, str] | None,
-        console: str,
-        experiment: int,
-    ) -> Attempt:
-        """Say what the job in work died of."""
-        progress = worker.last_progress
-        status, reason = cause or self._cause_of_death(code, progress)
-        lasted = time.monotonic() - (progress.began or worker.since)
-        where = progress.where + self._study.component(experiment, progress.component)
-        outcome = Outcome(status, f"{reason} {where}", None, None, lasted, console)
-        own = cause is None or cause in _CHANNEL
-        fault = fault_of(outcome, self._study.trouble() if own else None)
-        # Who kills the supervisor too has been looked for from inside: it is small, and holds no data.
-        killed_by = signal_name(code) if cause is None and not worker.lost_supervisor else ""
-        return Attempt(outcome, fault, killed_by, own, progress.place, was_first=worker.runs == 0)
-
-    def _cause_of_death(self, code: int, progress: Progress) -> tuple[Status, str]:
-        limit = self._memory_limit
-        if limit is not None and progress.growth >= 0.7 * limit:
-            return Status.MEMORY, f"the run outgrew {limit / 2**20:.0f} MiB and died"
-        if code == LOST:
-            return Status.EXIT, "the FMU closed or spoilt the worker's pipes"
-        if code >= 0:
-            return Status.EXIT, f"the FMU ended the process with exit code {code}"
-        return Status.CRASH, f"the process died by {signal_name(code)}"
 
 
 def _shut_down(workers: list[WorkerProcess], inbox: Inbox, study: Study, blas: threadpool_limits) -> None:

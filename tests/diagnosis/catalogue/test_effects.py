@@ -338,7 +338,14 @@ PLACES = {
     "EmpiricalVoltage": ("inverterEffect", "du"),
     "EmpiricalSensor": ("currentSensorEffect", "d"),
 }
-READ = {"screw": "vszN", "shaft": ("phi", "T"), "contact": ("phi",), "winding": "P", "torque": ("i_q",), "inverter": ("i_q",)}
+READ = {
+    "screw": "vszN",
+    "shaft": ("phi", "T"),
+    "contact": ("phi",),
+    "winding": "P",
+    "torque": ("i_q",),
+    "inverter": ("i_q",),
+}
 TERMS: dict[str, Law] = {
     "1": lambda q: np.ones(TIME.size),
     "|v|": lambda q: np.abs(q["v"]),
@@ -377,7 +384,17 @@ TERMS: dict[str, Law] = {
     "u |u|": lambda q: q["u"] * np.abs(q["u"]),
 }
 #: How large a term is made.
-SIZES = {"F": 200.0, "tau": 0.5, "e": 1e-6, "g_R": 0.05, "g_psi": 0.01, "g_t": 0.02, "g_e": 0.02, "du": 2.0, "d": 0.1}
+SIZES = {
+    "F": 200.0,
+    "tau": 0.5,
+    "e": 1e-6,
+    "g_R": 0.05,
+    "g_psi": 0.01,
+    "g_t": 0.02,
+    "g_e": 0.02,
+    "du": 2.0,
+    "d": 0.1,
+}
 
 
 #: Terms that are not proportional to their coefficient: a width, a time.

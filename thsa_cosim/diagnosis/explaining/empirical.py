@@ -104,7 +104,9 @@ _LIBRARY: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
     ),
     ("ContactEffect", "EmpiricalClearance"): (
         (
-            EffectParameter("gap", "m", 2e-5, "coefficient of a dead zone of this width", lower=0.0, upper=0.05),
+            EffectParameter(
+                "gap", "m", 2e-5, "coefficient of a dead zone of this width", lower=0.0, upper=0.05
+            ),
             _TAKEN_UP,
         ),
     ),

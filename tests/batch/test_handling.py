@@ -8,12 +8,14 @@ import pytest
 from fmu_sources import build
 
 from tests.fmu.test_plant import lag
-from thsa_cosim.batch import Experiment, Job, LocalRunner
+from thsa_cosim.batch import Experiment, Job, LocalRunner, Runner
 from thsa_cosim.batch.handling import largest_change, try_input_handling
 from thsa_cosim.batch.own_step import moves_within, own_step
+from thsa_cosim.batch.repetition import try_repetition
 from thsa_cosim.errors import ParameterError
 from thsa_cosim.fmu import Plant, read_description
-from thsa_cosim.scenario.handling import settle_handling
+from thsa_cosim.scenario.executor import Executor
+from thsa_cosim.scenario.handling import settle, settle_handling
 from thsa_cosim.scenario.model import SimulationTable
 from thsa_cosim.signals import Signals
 
@@ -57,6 +59,47 @@ def test_a_foreign_fmu_is_tried_ours_is_trusted_and_a_key_fixes_it() -> None:
     assert "WARNING: y of this Co-Simulation is" in fixed.notes[0]
     with LocalRunner([foreign], backend="python") as runner:
         assert runner.run([Job("x")])[0].ok
+
+
+@pytest.mark.parametrize(("habit", "found"), [("KEEPS", True), ("FIRST_WINS", True), ("EULER", False)])
+def test_what_a_library_keeps_between_instances_is_found(habit: str, found: bool) -> None:
+    step = Experiment("x", build.habits2(habit), Signals(TIME, {"u": np.ones(201)}), ("y",), TIME)
+    repetition = try_repetition(step, backend="python")
+    assert repetition.first.ok
+    assert ("changes y" in repetition.fault) is found
+    assert repetition.limits == ({"recycle_runs": 1} if found else {})
+
+
+@pytest.mark.slow
+def test_a_study_gives_each_run_a_process_where_a_second_instance_is_wrong() -> None:
+    """Every instance has the parameters of the first one in its process."""
+    flags = 'canBeInstantiatedOnlyOncePerProcess="true" canHandleVariableCommunicationStepSize="true"'
+    fmu = build.habits2("FIRST_WINS", flags=flags)
+    step = Experiment("x", fmu, Signals(TIME, {"u": np.ones(201)}), ("y",), TIME)
+    jobs = [Job("x", {"tau": tau}) for tau in (0.1, 0.2, 0.4)]
+    exact = [1.0 - np.exp(-TIME / tau) for tau in (0.1, 0.2, 0.4)]
+
+    def worst(runner: Runner) -> float:
+        with runner:
+            found = [outcome.signals for outcome in runner.run(jobs)]
+        return max(
+            float(np.max(np.abs(s["y"] - y))) for s, y in zip(found, exact, strict=True) if s is not None
+        )
+
+    guarded = Executor().open_runner(SimulationTable(), [step])
+    assert [
+        n
+        for n in guarded.notes
+        if "keeps something in its process: a second run in one process changes y" in n
+    ]
+    assert worst(guarded) < 1e-9
+    assert worst(LocalRunner([step], backend="python")) > 0.01
+
+
+def test_an_fmu_that_repeats_itself_keeps_its_process() -> None:
+    settled = settle(SimulationTable(), [experiment()])
+    assert not settled.limits
+    assert not any("process" in note for note in settled.notes)
 
 
 def test_a_way_that_the_fmu_does_not_offer_is_refused() -> None:

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmu_sources.build import FAULTS, LAG2, lag2, library, write_fmu
+from fmu_sources.build import FAULTS, LAG2, events2, lag2, library, write_fmu
 
-from thsa_cosim.check import CheckReport, Excitation, Finding, Verdict, check_fmu
+from thsa_cosim.batch import Outcome, Status
+from thsa_cosim.check import CheckReport, Excitation, Finding, Verdict, check_fmu, numerics
 from thsa_cosim.errors import FmuError, ParameterError
 from thsa_cosim.fmu import probe, read_description
 from thsa_cosim.fmu.sources import compile_sources
+from thsa_cosim.signals import Signals
 
 FMUS = Path(__file__).parents[2] / "fmus"
 
@@ -157,6 +159,29 @@ def test_wrong_reset_is_found_and_both_interfaces_compared() -> None:
     assert report.reuse == "fresh"
     assert report.verdict is Verdict.WARNING
     assert "nothing changes with fault, at" in line(report, "start values").text
+
+
+def test_a_balance_that_is_zero_but_for_the_solvers_errors_is_not_compared() -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    first = Signals(time, {"v": time, "residual": 1e-6 * np.sin(9.0 * time)})
+    exchange = Outcome(Status.OK, "", Signals(time, {"v": time * (1 + 1e-5), "residual": 1e-4 * time}))
+    tight = Signals(time, {"v": time, "residual": 1e-8 * time})
+    assert numerics.judge_exchange(first, exchange)[0] is Verdict.WARNING
+    assert numerics.shrinking(first, tight) == {"residual"}
+    verdict, text, _ = numerics.judge_exchange(first, exchange, ("residual",))
+    assert verdict is Verdict.OK
+    assert text.endswith("residual not compared: zero but for the solver's errors")
+    # One that is small for itself stays as small.
+    assert numerics.shrinking(first, first) == set()
+
+
+def test_a_parameter_is_idle_only_if_none_of_the_values_of_a_search_shows() -> None:
+    """The fault at 2 s comes after the end; one at 0.5 s does not."""
+    given = {"duration": 1.0, "parameters": ("kick",), "values": {"dv": 1.0}}
+    late = check_fmu(events2(), excitation=Excitation(**given, alternatives={"kick": (2.0,)}), cycles=1)
+    assert line(late, "start values").verdict is Verdict.WARNING
+    found = check_fmu(events2(), excitation=Excitation(**given, alternatives={"kick": (2.0, 0.5)}), cycles=1)
+    assert line(found, "start values").text == "each of 1 changes some output"
 
 
 def test_derivatives_that_are_wrong_show_with_their_figure() -> None:

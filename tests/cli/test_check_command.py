@@ -81,3 +81,14 @@ def test_what_is_not_there_is_one_sentence(tmp_path: Path, capsys: pytest.Captur
     for name in ("a.fmu", "a.csv", "a.toml"):
         assert run_command(["check", str(tmp_path / name)]) == 2
         assert name in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["redundant_failure", "redundant_diagnosis"])
+def test_the_redundant_actuators_scenarios_warn_of_nothing_in_their_fmu(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Failures that the start values put after the end of the recording; an energy balance near zero."""
+    assert run_command(["check", str(ROOT / f"scenarios/{name}.toml"), "--json"]) == 0
+    findings = json.loads(capsys.readouterr().out)["fmu"]["findings"]
+    assert [f for f in findings if f["verdict"] not in ("ok", "not tried")] == []

@@ -3,6 +3,8 @@
 ``job``, ``outcome``  what is to be simulated, what became of it
 ``runner``            what all runners promise
 ``local``             worker processes on this machine (``process`` and ``worker``: its two ends)
+``handling``          how a foreign FMU is given its inputs, found by trial
+``repetition``        whether its runs may share a process, likewise
 ``cluster``           the same jobs on a Dask cluster
 ``journal``           the durable table of evaluated vectors
 """

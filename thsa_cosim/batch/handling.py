@@ -7,6 +7,7 @@ FMU offers it, an eighth of the step otherwise. A way is consistent if half the 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -98,14 +99,17 @@ _NAMES = {
 }
 
 
-def try_input_handling(experiment: Experiment, *, deadline_s: float | None = 60.0) -> HandlingTrial:
-    """Compare the ways to give an FMU the inputs of ``experiment``.
+def try_input_handling(
+    experiment: Experiment, *, deadline_s: float | None = 60.0, **limits: int
+) -> HandlingTrial:
+    """Compare the ways to give an FMU the inputs of ``experiment``; ``limits``: further options of ``LocalRunner``.
 
     Raises
     ------
     FmuError, ParameterError
         If the experiment does not fit its FMU.
     """
+    options: dict[str, Any] = {"deadline_s": deadline_s, **limits}
     description = read_description(experiment.fmu)
     modes = _modes(description, experiment.inputs)
     plain = replace(experiment, reduce=None, wrapper=None, input_mode=None)
@@ -118,7 +122,7 @@ def try_input_handling(experiment: Experiment, *, deadline_s: float | None = 60.
     reference, source = None, ""
     if description.supports_model_exchange and description.fmi_version != "1.0":
         exact = [replace(plain, name=f"{t:g}", tolerance=t) for t in REFERENCE_TOLERANCES]
-        with LocalRunner(exact, kind="model-exchange", deadline_s=deadline_s) as runner:
+        with LocalRunner(exact, kind="model-exchange", **options) as runner:
             for one in exact:
                 (outcome,) = runner.run([Job(one.name)])
                 if outcome.ok and outcome.signals is not None:
@@ -127,7 +131,7 @@ def try_input_handling(experiment: Experiment, *, deadline_s: float | None = 60.
     fine = replace(plain, name="fine", time=refined(experiment.time, 8), input_mode="mean")
     if not description.supports_co_simulation:
         return HandlingTrial(source, (), reference is not None, "it offers Model Exchange only")
-    with LocalRunner([*trials, fine], kind="co-simulation", deadline_s=deadline_s) as runner:
+    with LocalRunner([*trials, fine], kind="co-simulation", **options) as runner:
         if reference is None:
             (outcome,) = runner.run([Job("fine")])
             if not outcome.ok or outcome.signals is None:

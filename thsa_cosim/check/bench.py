@@ -3,12 +3,13 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
 from thsa_cosim.batch.handling import HandlingTrial, try_input_handling
+from thsa_cosim.batch.repetition import try_repetition
 from thsa_cosim.check import numerics
 from thsa_cosim.check.budget import LONGEST_RUN, SLOW_SHARES, TOTAL, Budget, Watch, is_slow
 from thsa_cosim.check.excitation import Excitation
@@ -58,6 +59,7 @@ class Bench:
         self._handling: HandlingTrial | None = None
         self._first = Signals(self._time, {})
         self._halves = True
+        self._fault, self._limits = "", dict[str, Any]()
         self._budget = Budget()
         self._rests = False
         self._runs_changed = False
@@ -129,9 +131,9 @@ class Bench:
             deadline_s=self._deadline,
             reuse=reuse,
             kind=kind or self._kind,
-            # The same bits, and a process starts a second earlier than with machine code.
-            backend=("python" if len(self._time) < _LONG else None) if backend == "auto" else backend,
+            backend=self._backend if backend == "auto" else backend,
             recycle_growth_mb=1e6,
+            **self._limits,
         )
 
     def _many(
@@ -234,7 +236,7 @@ class Bench:
 
     def _try(self) -> Outcome:
         """Run once; find out how inputs are to be given, and run so."""
-        outcome = self._run_once()
+        outcome = self._first_once()
         if outcome.ok and outcome.duration_s > LONGEST_RUN and self._is_free and not self._cut:
             seconds, points = np.ptp(self._time), len(self._time)
             self._shorten(self._time[: int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))])
@@ -247,11 +249,29 @@ class Bench:
         if told or not outcome.ok or self._kind != "co-simulation":
             return outcome
         self._handling = try_input_handling(
-            self._experiment("handling", self._time), deadline_s=self._deadline
+            self._experiment("handling", self._time), deadline_s=self._deadline, **self._limits
         )
         best = self._handling.best
         self._mode = None if best is None else best.mode
         return self._run_once()
+
+    def _first_once(self) -> Outcome:
+        """Run once; see whether a second run of a foreign FMU may share the process."""
+        if is_ours(self._description) or self._fault:
+            return self._run_once()
+        repetition = try_repetition(
+            self._experiment("trial", self._time),
+            kind=self._kind,
+            deadline_s=self._deadline,
+            backend=self._backend,
+        )
+        self._fault, self._limits = repetition.fault, repetition.limits
+        return repetition.first
+
+    @property
+    def _backend(self) -> Backend | None:
+        """The same bits, and a process starts a second earlier than with machine code."""
+        return "python" if len(self._time) < _LONG else None
 
     def _run_once(self) -> Outcome:
         with self._runner() as runner:

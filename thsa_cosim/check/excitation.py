@@ -25,6 +25,8 @@ class Excitation:
     step: float | None = None
     parameters: tuple[str, ...] = ()
     """Parameters that have to change something; default: all that can."""
+    alternatives: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    """Values to try such a parameter with, one after the other; default: 1 % off what it declares."""
     tolerance: float | None = None
     kind: Kind | None = None
     input_mode: str | None = None

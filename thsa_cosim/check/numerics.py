@@ -22,6 +22,8 @@ _FALLS = 0.6
 """Share of the first halving's change below which that of the last one tried is a convergence."""
 _FAR = 20.0
 """Ranges of an output over the rest of a run, by which its first value is no value."""
+_SHRINKS = 0.2
+"""A signal that falls below this share with a hundredth of the tolerance is an error of the solver."""
 Judged = tuple[Verdict, str, dict[str, float]]
 
 
@@ -138,12 +140,20 @@ def judge_larger_inputs(
     return Verdict.OK, f"up to {outcomes[-1][0]:g} times as large, halving the step changes {worst:.1e}", {}
 
 
-def judge_exchange(first: Signals, outcome: Outcome) -> Judged:
-    """Whether both interfaces say the same."""
+def shrinking(loose: Signals, tight: Signals) -> set[str]:
+    """Signals whose size falls with the solver's tolerance: nothing but its errors."""
+    return {n for n in loose.names if np.max(np.abs(tight[n])) <= _SHRINKS * np.max(np.abs(loose[n])) != 0.0}
+
+
+def judge_exchange(first: Signals, outcome: Outcome, zeros: Sequence[str] = ()) -> Judged:
+    """Whether both interfaces say the same; ``zeros`` are zero but for the solvers' errors, and are not compared."""
     if not outcome.ok or outcome.signals is None:
         return Verdict.WARNING, f"it fails, Co-Simulation works: {outcome.status}: {outcome.reason}", {}
-    change, worst = largest_change(first.values, outcome.signals.values, jumps=True)
+    names = [n for n in first.names if n not in zeros]
+    change, worst = largest_change(first.values, outcome.signals.values, names, jumps=True)
     text = f"{worst} differs from Co-Simulation by {change:.1e} of its range"
+    if zeros:
+        text += f"; {', '.join(zeros)} not compared: zero but for the solver's errors"
     return Verdict.OK if change <= AGREE else Verdict.WARNING, text, {"change": change}
 
 
@@ -152,17 +162,13 @@ def judge_changes(first: Signals, outcomes: Mapping[str, Outcome], what: str, un
 
     ``untried``: how many more there are.
     """
-    silent = [
-        name
-        for name, outcome in outcomes.items()
-        if outcome.ok and outcome.signals is not None and same(first.values, outcome.signals.values)
-    ]
+    idle = silent(first, outcomes)
     failing = [name for name, outcome in outcomes.items() if not outcome.ok]
-    n, quiet = len(outcomes), len(silent)
+    n, quiet = len(outcomes), len(idle)
     values = {"tried": float(n), "silent": float(quiet)}
-    text = f"each of {n} changes some output" if not silent else f"{n - quiet} of {n} change some output"
-    if silent:
-        listed = ", ".join(silent[:12]) + (f" and {quiet - 12} more" if quiet > 12 else "")
+    text = f"each of {n} changes some output" if not idle else f"{n - quiet} of {n} change some output"
+    if idle:
+        listed = ", ".join(idle[:12]) + (f" and {quiet - 12} more" if quiet > 12 else "")
         text += f"; nothing changes with {listed}"
     if failing:
         text += f"; the run fails with another {', '.join(failing[:5])}"
@@ -171,6 +177,15 @@ def judge_changes(first: Signals, outcomes: Mapping[str, Outcome], what: str, un
     if n and quiet == n:
         return Verdict.WARNING, f"no output changes with any of {n} {what}: they are ignored", values
     return Verdict.OK, text, values
+
+
+def silent(first: Signals, outcomes: Mapping[str, Outcome]) -> list[str]:
+    """Names of those of ``outcomes`` that equal the first run."""
+    return [
+        name
+        for name, outcome in outcomes.items()
+        if outcome.ok and outcome.signals is not None and same(first.values, outcome.signals.values)
+    ]
 
 
 def judge_first_values(signals: Signals) -> Judged | None:

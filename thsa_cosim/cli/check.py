@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from thsa_cosim.check import CheckReport, Finding
     from thsa_cosim.identify.sensitivity import PointSensitivity
+    from thsa_cosim.parameters import ParameterSpace
     from thsa_cosim.scenario import Scenario, StagedScenario, TuneScenario
 
 Checked = tuple[Mapping[str, Any], Callable[["Console"], None]]
@@ -235,6 +236,24 @@ def _with_sensitivities(
     return {**content, "sensitivity": sensitivity_dict(points)}, shown
 
 
+def _alternatives(
+    space: "ParameterSpace", recording: str, variables: tuple[str, ...]
+) -> dict[str, tuple[float, ...]]:
+    """Values that a search may give each variable, one parameter moved at a time: within, then at either bound."""
+    start = space.start()
+    ways: dict[str, list[float]] = {name: [] for name in variables}
+    usual = space.assignments(space.decode(start), recording)
+    for i, at in enumerate(start):
+        for place in (at + 0.3 if at <= 0.5 else at - 0.3, 0.0, 1.0):
+            vector = start.copy()
+            vector[i] = place
+            moved = space.assignments(space.decode(vector), recording)
+            for name in variables:
+                if moved[name] != usual[name]:
+                    ways[name].append(moved[name])
+    return {name: tuple(values) for name, values in ways.items() if values}
+
+
 def _fmu_of(
     loaded: "Scenario | StagedScenario | TuneScenario",
     limits: Mapping[str, float],
@@ -251,6 +270,7 @@ def _fmu_of(
     spec = loaded.simulation
     values: dict[str, float] = {}
     searched: tuple[str, ...] = ()
+    alternatives: dict[str, tuple[float, ...]] = {}
     if isinstance(loaded, TuneScenario):
         experiment = build_groups(loaded)[0].cases[0].experiment
         searched = tuple(p.variable for p in loaded.parameters.parameters)
@@ -264,6 +284,7 @@ def _fmu_of(
         named = dict(zip(point.space.names, start.tolist(), strict=True))
         values = point.space.assignments(named, case.name)
         searched = tuple(n for n in values if n not in experiment.wrapper_names)
+        alternatives = _alternatives(point.space, case.name, searched)
     own = experiment.wrapper_names
     values = {n: v for n, v in {**experiment.fixed, **values}.items() if n not in own}
     return check_fmu(
@@ -274,6 +295,7 @@ def _fmu_of(
             inputs=experiment.inputs,
             time=experiment.time,
             parameters=searched,
+            alternatives=alternatives,
             tolerance=spec.tolerance,
             kind=spec.interface,
             input_mode=spec.inputs,

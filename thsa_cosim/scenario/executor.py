@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from thsa_cosim.batch import Experiment, LocalRunner, Runner
-from thsa_cosim.scenario.handling import settle_handling
+from thsa_cosim.scenario.handling import settle
 from thsa_cosim.scenario.schema import SimulationTable
 
 OpenRunner = Callable[[SimulationTable, Sequence[Experiment]], Runner]
@@ -38,8 +38,8 @@ class Executor:
     def open_runner(self, spec: SimulationTable, experiments: Sequence[Experiment]) -> Runner:
         """Open the processes.
 
-        How a foreign FMU is given its inputs is settled first, by a trial where the scenario does not say it; the
-        runner's ``notes`` say what was found.
+        How a foreign FMU is given its inputs is settled first, by a trial where the scenario does not say it, and
+        whether its runs may share a process; the runner's ``notes`` say what was found.
 
         Raises
         ------
@@ -48,7 +48,7 @@ class Executor:
         MissingExtraError, StudyError
             If Dask is not installed, or no scheduler answers.
         """
-        settled = settle_handling(spec, experiments)
+        settled = settle(spec, experiments)
         chosen = [
             replace(e, input_mode=mode) if mode is not None else e
             for e, mode in zip(experiments, settled.modes, strict=True)
@@ -59,6 +59,7 @@ class Executor:
             "reuse": spec.reuse,
             "stepping": spec.stepping,
             "kind": settled.interface,
+            **settled.limits,
         }
         if self.address is None:
             return _noted(LocalRunner(chosen, workers=self.workers, **limits), settled.notes)

@@ -1,12 +1,13 @@
-"""How the FMUs of a study are given their inputs: what the scenario fixes, else what a trial finds."""
+"""How the FMUs of a study are run: what the scenario fixes, else what trials find (inputs, processes)."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from thsa_cosim.batch import Experiment
 from thsa_cosim.batch.handling import HandlingTrial, try_input_handling
+from thsa_cosim.batch.repetition import Repetition, try_repetition
 from thsa_cosim.errors import FmuError, ParameterError
 from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.inputs import input_variables, is_linear, is_ours
@@ -19,6 +20,7 @@ WARN = 1e-3
 _STEPS = 4000
 """Communication steps of a trial; more only until the inputs have begun to move."""
 _trials: dict[tuple[str, str, tuple[str, ...], int, bytes], HandlingTrial] = {}
+_repetitions: dict[tuple[str, str, int, str], Repetition] = {}
 
 
 @dataclass(frozen=True)
@@ -29,9 +31,53 @@ class Settled:
     modes: tuple[str | None, ...]
     """One per experiment; None: as its FMU is trusted."""
     notes: tuple[str, ...]
+    limits: Mapping[str, int] = field(default_factory=dict)
+    """Further options of the runner."""
 
 
-def settle_handling(spec: SimulationTable, experiments: Sequence[Experiment]) -> Settled:
+def settle(spec: SimulationTable, experiments: Sequence[Experiment]) -> Settled:
+    """Settle the inputs of foreign FMUs, and whether their runs may share a process."""
+    settled = settle_handling(spec, experiments)
+    modes, kind = settled.modes, settled.interface
+    found: dict[str, Repetition] = {}
+    for experiment, mode in zip(experiments, modes, strict=True):
+        foreign = _foreign(experiment)
+        if foreign is not None and foreign.sha256 not in found:
+            found[foreign.sha256] = _repetition(spec, foreign, replace(experiment, input_mode=mode), kind)
+    faults = [repetition for repetition in found.values() if repetition.fault]
+    if not faults:
+        return settled
+    limits = faults[0].limits
+    settled = settle_handling(spec, experiments, limits)  # the first trials have shared their processes
+    kept = (
+        f"The FMU keeps something in its process: {faults[0].fault}, a new process nothing. Every run gets a "
+        f"separate process, which costs about half a second each."
+    )
+    return replace(settled, notes=(*settled.notes, kept), limits=limits)
+
+
+def _foreign(experiment: Experiment) -> FmuDescription | None:
+    try:
+        description = read_description(experiment.fmu)
+    except FmuError:
+        return None  # said elsewhere
+    return None if is_ours(description) else description
+
+
+def _repetition(
+    spec: SimulationTable, description: FmuDescription, experiment: Experiment, kind: Kind | None
+) -> Repetition:
+    short = _short(experiment)
+    key = description.sha256, experiment.name, len(short.time), repr((kind, spec.reuse, short.input_mode))
+    if key not in _repetitions:
+        options = {"kind": kind, "reuse": spec.reuse, "stepping": spec.stepping, "deadline_s": spec.deadline}
+        _repetitions[key] = try_repetition(short, **options)
+    return _repetitions[key]
+
+
+def settle_handling(
+    spec: SimulationTable, experiments: Sequence[Experiment], limits: Mapping[str, int] | None = None
+) -> Settled:
     """Try each foreign Co-Simulation FMU once on the first of its experiments that has inputs.
 
     The choice depends on the FMU, the scenario and the recordings alone, so that a continued study makes it again.
@@ -44,7 +90,7 @@ def settle_handling(spec: SimulationTable, experiments: Sequence[Experiment]) ->
             continue
         digests[index] = description.sha256
         if description.sha256 not in found:
-            trial = _trial(spec, description, experiment)
+            trial = _trial(spec, description, experiment, limits or {})
             if trial is not None:
                 found[description.sha256] = trial
     interface = spec.interface
@@ -77,26 +123,33 @@ def _in_question(spec: SimulationTable, experiment: Experiment) -> FmuDescriptio
 
 
 def _trial(
-    spec: SimulationTable, description: FmuDescription, experiment: Experiment
+    spec: SimulationTable, description: FmuDescription, experiment: Experiment, limits: Mapping[str, int]
 ) -> HandlingTrial | None:
     assert experiment.inputs is not None
+    short = _short(experiment)
     table = np.array([experiment.inputs[name] for name in experiment.inputs.names])
-    moving = np.flatnonzero((np.diff(table, axis=1) != 0.0).any(axis=0))
-    begin = float(experiment.inputs.time[moving[0]]) if len(moving) else 0.0
-    count = _STEPS + int(np.searchsorted(experiment.time, begin))
-    own = experiment.wrapper_names
-    fixed = {name: value for name, value in experiment.fixed.items() if name not in own}
-    short = replace(experiment, time=experiment.time[: count + 1], fixed=fixed)
-    excitation = (
-        table.tobytes() + repr((sorted(fixed.items()), dict(experiment.texts), spec.tolerance)).encode()
-    )
+    rest = sorted(short.fixed.items()), dict(experiment.texts), spec.tolerance, dict(limits)
+    excitation = table.tobytes() + repr(rest).encode()
     key = description.sha256, experiment.name, tuple(experiment.outputs), len(short.time), excitation
     if key not in _trials:
         try:
-            _trials[key] = try_input_handling(short, deadline_s=spec.deadline)
+            _trials[key] = try_input_handling(short, deadline_s=spec.deadline, **limits)
         except (FmuError, ParameterError):
             return None
     return _trials[key]
+
+
+def _short(experiment: Experiment) -> Experiment:
+    """The begin of an experiment, until its inputs have moved for a while, without what belongs to its wrapper."""
+    begin = 0.0
+    if experiment.inputs is not None:
+        table = np.array([experiment.inputs[name] for name in experiment.inputs.names])
+        moving = np.flatnonzero((np.diff(table, axis=1) != 0.0).any(axis=0))
+        begin = float(experiment.inputs.time[moving[0]]) if len(moving) else 0.0
+    count = _STEPS + int(np.searchsorted(experiment.time, begin))
+    own = experiment.wrapper_names
+    fixed = {name: value for name, value in experiment.fixed.items() if name not in own}
+    return replace(experiment, time=experiment.time[: count + 1], fixed=fixed)
 
 
 def _note(spec: SimulationTable, trial: HandlingTrial, interface: Kind | None) -> str:

@@ -1,12 +1,16 @@
 """``thsa-cosim check PATH``: the path's ending says what is checked, and the exit code what came of it."""
 
+import inspect
 import json
 from pathlib import Path
 
 import pytest
 from fmu_sources import build
 
+from thsa_cosim.check import check_fmu
+from thsa_cosim.check.budget import TOTAL
 from thsa_cosim.cli import run_command
+from thsa_cosim.cli.check import check as check_command
 from thsa_cosim.fmu import read_description
 from thsa_cosim.fmu.probe import facts
 from thsa_cosim.report.check import states
@@ -81,6 +85,14 @@ def test_what_is_not_there_is_one_sentence(tmp_path: Path, capsys: pytest.Captur
     for name in ("a.fmu", "a.csv", "a.toml"):
         assert run_command(["check", str(tmp_path / name)]) == 2
         assert name in capsys.readouterr().err
+
+
+def test_the_command_and_the_function_have_the_same_limits() -> None:
+    """The command's help shows them before the room that knows them is imported."""
+    options = {option.name: option.default for option in check_command.params}
+    own = inspect.signature(check_fmu).parameters
+    assert options["deadline"] == own["deadline_s"].default
+    assert options["time_limit"] == own["limit_s"].default == TOTAL
 
 
 @pytest.mark.slow

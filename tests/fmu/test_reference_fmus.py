@@ -14,8 +14,8 @@ from scipy.integrate import solve_ivp
 
 from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu import Plant, read_description
-from thsa_cosim.fmu.description import NUMBERS
 from thsa_cosim.fmu.sources import compile_sources
+from thsa_cosim.fmu.variable import NUMBERS
 
 ROOT = Path(os.environ.get("REFERENCE_FMUS", ""))
 pytestmark = [

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thsa_cosim.fmu.description import Variable
 from thsa_cosim.fmu.segments import MERGED, Segments, merging_tolerance, segments, vertices
+from thsa_cosim.fmu.variable import Variable
 from thsa_cosim.signals import FloatArray, Signals
 
 

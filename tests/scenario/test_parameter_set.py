@@ -103,6 +103,11 @@ def test_a_boolean_is_a_number(tmp_path: Path, text: str, number: float) -> None
         ),
         (
             "order",
+            'Enumeration value="4"',
+            "'order' of model.fmu is an enumeration without an item '4'; give one of one, two, three.",
+        ),
+        (
+            "order",
             'Real value="2.5"',
             "2.5 is not a whole number; 'order' of model.fmu is of type Enumeration",
         ),

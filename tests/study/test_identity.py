@@ -1,5 +1,6 @@
 """What makes two runs the same study: every key of every kind counts, and files count by their content."""
 
+import hashlib
 import json
 import re
 import shutil
@@ -443,3 +444,12 @@ def test_names_contents_and_borders_of_files_count_and_line_ends_do_not(tmp_path
     assert len(set(different)) == len(different)
     assert of(a_mo=b"x", other_txt=b"no") == of(a_mo=b"x")
     assert digest_of_folder(tmp_path / "not there", ["*"]) == of()
+
+
+def test_the_digest_of_a_folder_is_the_same_on_every_machine(tmp_path: Path) -> None:
+    """In the order of the names with "/", whatever a platform sorts paths by: "a.mo" before "a/b.mo"."""
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "b.mo").write_bytes(b"1")
+    (tmp_path / "a.mo").write_bytes(b"22")
+    content = b"a.mo\x002\x0022" + b"a/b.mo\x001\x001"
+    assert digest_of_folder(tmp_path, ["*.mo"]) == hashlib.sha256(content).hexdigest()

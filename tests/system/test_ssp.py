@@ -405,7 +405,7 @@ def test_clocks_that_an_importer_has_to_tick_are_refused() -> None:
         assemble("s", [Part("a", build.clock3())], [], {})
 
 
-def test_an_item_of_an_enumeration_is_set_by_its_name(tmp_path: Path) -> None:
+def test_an_item_of_an_enumeration_is_set_by_its_name_or_number(tmp_path: Path) -> None:
     """The FMU of strict2.c: its parameter ``order`` is an enumeration of one, two, three."""
     plain = '<ssd:ParameterBindings><ssd:ParameterBinding prefix="a."><ssd:ParameterValues>{}</ssd:ParameterValues>'
     values = (
@@ -428,7 +428,10 @@ def test_an_item_of_an_enumeration_is_set_by_its_name(tmp_path: Path) -> None:
             file.write(build.strict2(), "a.fmu")
         return described(path)
 
-    (component,) = system("three").components
-    assert component.start == {"order": 3.0}
+    for item in ("three", "3"):
+        (component,) = system(item).components
+        assert component.start == {"order": 3.0}
     with pytest.raises(FmuError, match=r"'a\.order' holds Enumeration; .* give one of one, two, three\."):
         system("four")
+    with pytest.raises(FmuError, match=r"'a\.order' holds Enumeration; .* give one of one, two, three\."):
+        system("4")

@@ -10,9 +10,10 @@
 ``fmi1`` ...     the versions of the FMI; ``instance`` what 2.0 and 3.0 have in common
 """
 
-from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription, Variable, read_description
+from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription, read_description
 from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.plant import Plant
+from thsa_cosim.fmu.variable import Variable
 
 __all__ = [
     "DefaultExperiment",

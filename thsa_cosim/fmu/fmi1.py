@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from thsa_cosim.errors import FmuError, ParameterError
-from thsa_cosim.fmu.description import FmuDescription, Variable
+from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.inputs import communication_grid, input_variables, is_linear, sampled
 from thsa_cosim.fmu.instance import Phase
+from thsa_cosim.fmu.variable import Variable
 from thsa_cosim.signals import FloatArray, Signals
 
 _TYPES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}

@@ -27,7 +27,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from thsa_cosim.errors import ParameterError
-from thsa_cosim.fmu.description import FmuDescription, Variable
+from thsa_cosim.fmu.description import FmuDescription
+from thsa_cosim.fmu.variable import Variable
 from thsa_cosim.signals import FloatArray, Signals
 
 

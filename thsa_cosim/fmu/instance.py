@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thsa_cosim.errors import ParameterError
-from thsa_cosim.fmu.description import FmuDescription, Variable
+from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.native import Library, Messages, MessageSink, failure, library_path, load_library
 from thsa_cosim.fmu.point import InstancePoint, Point
+from thsa_cosim.fmu.variable import Variable
 from thsa_cosim.signals import FloatArray
 
 ELEMENTS = "Elements"

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from thsa_cosim.fmu.archive import open_archive
-from thsa_cosim.fmu.description import NUMBERS, FmuDescription, Variable
+from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.native import LIBRARY_SUFFIX, platform_folders
+from thsa_cosim.fmu.variable import NUMBERS, Variable
 from thsa_cosim.signals import FloatArray, Signals
 
 _STEPS = 2000

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thsa_cosim.fmu.description import Variable
 from thsa_cosim.fmu.inputs import sampled
+from thsa_cosim.fmu.variable import Variable
 from thsa_cosim.signals import FloatArray, Signals
 
 MERGED = 1e-7

@@ -5,7 +5,7 @@ from typing import TypeVar
 
 from thsa_cosim.errors import ParameterError, UnitError
 from thsa_cosim.fmu import FmuDescription
-from thsa_cosim.fmu.description import Variable
+from thsa_cosim.fmu.variable import Variable
 from thsa_cosim.scenario.check import check_range, settable, takes_text
 from thsa_cosim.scenario.schema import CommonTable
 from thsa_cosim.scenario.table import StartValue
@@ -75,14 +75,9 @@ def _item(file: Path, variable: Variable, text: str, fmu: FmuDescription) -> flo
             f"{file}: {variable.name!r} of {fmu.path.name} is of type {variable.type} and takes no Enumeration;"
             f" give it as a {variable.type}."
         )
-    items = dict(variable.items)
-    if text in items:
-        return float(items[text])
-    try:
-        return float(int(text))
-    except ValueError:
-        known = f"one of {', '.join(items)}" if items else "its number"
-        raise ParameterError(
-            f"{file}: {variable.name!r} of {fmu.path.name} is an enumeration without an item {text!r};"
-            f" give {known}."
-        ) from None
+    if (number := variable.item(text)) is not None:
+        return number
+    known = f"one of {', '.join(name for name, _ in variable.items)}" if variable.items else "its number"
+    raise ParameterError(
+        f"{file}: {variable.name!r} of {fmu.path.name} is an enumeration without an item {text!r}; give {known}."
+    )

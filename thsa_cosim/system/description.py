@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription, Variable
+from thsa_cosim.fmu.description import DefaultExperiment, FmuDescription
+from thsa_cosim.fmu.variable import Variable
 from thsa_cosim.system.order import stages
 from thsa_cosim.system.structure import System, connected_inputs, qualified
 

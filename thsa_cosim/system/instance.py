@@ -11,13 +11,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from thsa_cosim.fmu.description import FmuDescription, Variable
+from thsa_cosim.fmu.description import FmuDescription
 from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.fmi2 import Fmi2Instance
 from thsa_cosim.fmu.fmi3 import Fmi3Instance
 from thsa_cosim.fmu.instance import Channel, EventInfo, Instance
 from thsa_cosim.fmu.native import Messages, MessageSink
 from thsa_cosim.fmu.point import Point
+from thsa_cosim.fmu.variable import Variable
 from thsa_cosim.signals import FloatArray
 from thsa_cosim.system.adaptive import Adaptive
 from thsa_cosim.system.description import DISTURBANCE, SystemDescription

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from thsa_cosim.errors import FmuError, UnitError, did_you_mean
 from thsa_cosim.fmu.description import FmuDescription
+from thsa_cosim.fmu.variable import Variable
 from thsa_cosim.system.unit_definitions import UnitDefinitions
 
 
@@ -79,15 +80,15 @@ class Entry:
         target: str,
         unit: str | None,
         definitions: UnitDefinitions,
-        items: Mapping[str, int] | None = None,
+        variable: Variable | None = None,
     ) -> float:
-        """The value in ``unit``; FmuError if it is no number or does not convert. ``items``: of an enumeration."""
-        value = self.value
-        if value is None and items:
-            value = items.get(self.binding.texts.get(self.mapped.source, ""))
+        """The value in ``unit``; FmuError if it does not convert, or is no number and no item of ``variable``."""
+        value, items = self.value, () if variable is None else variable.items
+        if value is None and variable is not None and variable.type == "Enumeration":
+            value = variable.item(self.binding.texts.get(self.mapped.source, ""))
         if value is None:
             kind = self.binding.others[self.mapped.source]
-            remedy = f"give one of {', '.join(items)}" if items else "so leave it out"
+            remedy = f"give one of {', '.join(name for name, _ in items)}" if items else "so leave it out"
             if kind == "String":
                 remedy += "; a text goes into [fixed] of the scenario"
             raise FmuError(
@@ -124,7 +125,7 @@ class Placement:
             if (pin := self._component_variable(name)) is not None:
                 component, variable = pin
                 found = self._fmus[component].variable(variable)
-                value = entry.number(variable, found.unit, self._definitions, dict(found.items))
+                value = entry.number(variable, found.unit, self._definitions, found)
                 self.starts.setdefault(component, {})[variable] = value
             elif (connector := self._connector(name)) is not None:
                 unit = self._connectors[connector]

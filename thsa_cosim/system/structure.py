@@ -9,7 +9,8 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from thsa_cosim.errors import FmuError, UnitError, did_you_mean
-from thsa_cosim.fmu.description import FmuDescription, Variable
+from thsa_cosim.fmu.description import FmuDescription
+from thsa_cosim.fmu.variable import Variable
 from thsa_cosim.units import conversion
 
 Execution = Literal["continuous", "coupled", "sampled"]

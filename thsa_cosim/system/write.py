@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from thsa_cosim.fmu.description import DefaultExperiment, Variable
+from thsa_cosim.fmu.description import DefaultExperiment
+from thsa_cosim.fmu.variable import Variable
 from thsa_cosim.ssv import SSC, SSV
 from thsa_cosim.system.description import SystemDescription
 from thsa_cosim.system.ssp import ANNOTATION, ROOT, SSD

@@ -1,5 +1,6 @@
 """What an untestable part of an effect leaves open of the parameters that imitate it, against least squares."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate, CandidateParameter
-from thsa_cosim.diagnosis.choosing.hidden import hidden_parts, notes_on_hidden, widening
+from thsa_cosim.diagnosis.choosing.hidden import HiddenPart, hidden_parts, notes_on_hidden, widening
 from thsa_cosim.diagnosis.choosing.screen import propose
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
@@ -98,3 +99,87 @@ def test_a_part_that_would_be_seen_leaves_nothing_open() -> None:
     fit = fitted(SPREAD)
     assert hidden_parts(found(fit, "differs")) == ()
     assert not widening((), fit).any()
+
+
+def test_what_is_in_the_model_and_what_has_several_parameters_is_no_hidden_part() -> None:
+    fit = fitted(SPREAD)
+    one = found(fit, "scales")
+    assert len(hidden_parts(one)) == 1
+    inside = Unknown(
+        "screwEffect.loss.scales", "screwEffect.loss.scales", "1", 0.0, np.inf, 1.0, -9.0, 9.0, declared=False
+    )
+    one.final = replace(fit, unknowns=fit.unknowns.with_members([inside]))
+    assert hidden_parts(one) == ()
+    one.final = fit
+    (proposal,) = one.rounds[0].proposals
+    several = replace(proposal.candidate, parameters=proposal.candidate.parameters * 2)
+    one.rounds[0].proposals = [replace(proposal, candidate=several)]
+    assert hidden_parts(one) == ()
+
+
+def test_a_part_of_another_effect_or_in_another_place_is_not_hidden_and_the_last_screening_counts() -> None:
+    one = found(fitted(SPREAD), "scales")
+    (proposal,) = one.rounds[0].proposals
+    own = proposal.candidate
+    for other in (
+        replace(own, variant=SimpleNamespace(**{**vars(own.variant), "block": "Other"})),
+        replace(own, variant=SimpleNamespace(**{**vars(own.variant), "beside": False})),
+        replace(own, slot=SimpleNamespace(name="motor", interface="FrictionEffect")),
+    ):
+        one.rounds[0].proposals = [replace(proposal, candidate=other)]
+        assert hidden_parts(one) == ()
+    seen = SimpleNamespace(proposals=[replace(proposal, remaining=0.5)], threshold=17.0)
+    unseen = SimpleNamespace(proposals=[proposal], threshold=17.0)
+    one.rounds = (unseen, seen)  # beside a further effect the part would be seen
+    assert hidden_parts(one) == ()
+    one.rounds = (seen, unseen)
+    assert len(hidden_parts(one)) == 1
+
+
+def part(moves: dict[str, float], unit: str = "1") -> HiddenPart:
+    own = replace(candidate("d").parameters[0], unit=unit)
+    return HiddenPart("loss:screw", own, "half a difference", -0.25, moves)
+
+
+def test_a_part_leaves_alone_what_it_does_not_move_and_several_add_in_quadrature() -> None:
+    fit = fitted(SPREAD)
+    np.testing.assert_allclose(widening([part({"K_t": -3.0})], fit), [3.0, 0.0])
+    np.testing.assert_allclose(
+        widening([part({"K_t": 3.0}), part({"K_t": 4.0, "T_c": 1.0})], fit), [5.0, 1.0]
+    )
+
+
+@pytest.mark.parametrize(("unit", "shown"), [("1", "-0.25"), ("N.m", "-0.25 N.m")])
+def test_the_note_in_full(unit: str, shown: str) -> None:
+    """Of several parameters it gives the one that would change by the largest share: T_c by half, K_t by a third."""
+    moves, errors = {"K_t": 0.1, "T_c": 0.05}, np.array([0.01, 0.01])
+    (note,) = notes_on_hidden([part(moves, unit)], fitted(SPREAD), errors)
+    assert note == (
+        "loss:screw: d, half a difference, acts on these recordings as a change of K_t and T_c does;"
+        f" with d = {shown}, T_c would be 0.15 in place of 0.1 N.m, which its standard error covers."
+        " Measure one of them apart from the machine (a torque constant by the back-EMF),"
+        " and give it that value with a small spread"
+    )
+    (note,) = notes_on_hidden([part({"T_c": 0.05}, unit)], fitted(SPREAD), errors)
+    assert "a change of T_c does" in note
+    assert "Measure T_c apart from the machine" in note
+
+
+def test_a_note_takes_more_than_a_standard_error_of_a_declared_parameter() -> None:
+    fit = fitted(SPREAD)
+    errors = np.array([0.1, 0.05])
+    assert notes_on_hidden([part({"K_t": 0.1, "T_c": 0.05})], fit, errors) == ()
+    assert notes_on_hidden([part({})], fit, errors) == ()
+    free = replace(fit, unknowns=Unknowns(tuple(replace(u, declared=False) for u in fit.unknowns.members)))
+    assert notes_on_hidden([part({"K_t": 0.2})], free, errors) == ()
+    # A part without a note does not end the list.
+    assert len(notes_on_hidden([part({}), part({"K_t": -0.2})], fit, errors)) == 1
+
+
+def test_a_parameter_that_is_zero_is_told_of_where_nothing_else_moves_only() -> None:
+    fit = replace(fitted(SPREAD), vector=np.array([0.307, 0.0]))
+    errors = np.array([0.01, 0.01])
+    (note,) = notes_on_hidden([part({"T_c": 0.05})], fit, errors)
+    assert "T_c would be 0.05 in place of 0 N.m" in note
+    (note,) = notes_on_hidden([part({"K_t": 0.02, "T_c": 0.05})], fit, errors)
+    assert "K_t would be 0.327 in place of 0.307 N.m/A" in note

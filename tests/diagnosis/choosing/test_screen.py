@@ -262,3 +262,40 @@ def test_products_are_those_of_what_remains_however_many_rows_at_a_time(
     left = without_declared(np.concatenate(responses, axis=1))
     np.testing.assert_allclose(orthogonal.products(responses), left.T @ left, rtol=1e-4, atol=0.3)
     np.testing.assert_allclose(orthogonal.remaining(responses[0]), left[:, :2], atol=1e-4)
+
+
+def orthogonal(p: np.ndarray, q: np.ndarray) -> Orthogonal:
+    unknowns = Unknowns((unknown("p"), unknown("q")))
+    return Orthogonal(Fit(unknowns, np.zeros(2), LEFT, np.column_stack([p, q]), np.ones(2), 0.0, True))
+
+
+def test_an_unknown_on_which_nothing_depends_imitates_nothing_however_little_the_others_do():
+    response = (COLUMNS["p"] + COLUMNS["a"])[:, None]
+    alone = float(COLUMNS["p"] @ response[:, 0] / (COLUMNS["p"] @ COLUMNS["p"]))
+    for size in (1.0, 1e-6):
+        moved = orthogonal(size * COLUMNS["p"], np.zeros(N)).project(response)
+        np.testing.assert_allclose(moved[:, 0], [alone / size, 0.0], rtol=1e-5)
+
+
+def test_two_unknowns_that_do_the_same_share_what_they_imitate():
+    both = orthogonal(COLUMNS["p"], COLUMNS["p"])
+    response = 2.0 * COLUMNS["p"][:, None]
+    np.testing.assert_allclose(both.project(response)[:, 0], [1.0, 1.0], rtol=1e-4)
+    np.testing.assert_allclose(both.remaining(response), 0.0, atol=1e-4)
+
+
+@pytest.mark.parametrize(("below", "share"), [(-1e-3, 1e-9), (1e-8, 1e-7), (1e-6, 1e-5)])
+def test_the_ridge_is_the_smallest_that_leaves_the_information_definite(below: float, share: float):
+    """Eigenvalues -below and 2 + below, about, times the sizes of the unknowns."""
+    sizes = np.diag([1e-4, 30.0])
+    information = sizes @ np.array([[1.0, 1.0 + below], [1.0 + below, 1.0]]) @ sizes
+    triangle, lower = room._factor(information)
+    upper = np.triu(triangle)
+    assert not lower
+    whole = information + share * np.diag(np.diag(information))
+    np.testing.assert_allclose(upper.T @ upper, whole, rtol=1e-11)
+
+
+def test_of_an_information_that_no_small_ridge_mends_the_sizes_count():
+    triangle, _ = room._factor(np.array([[4.0, 12.0, 0.0], [12.0, 9.0, 0.0], [0.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(np.triu(triangle), np.diag([2.0, 3.0, 1.0]), atol=1e-12)

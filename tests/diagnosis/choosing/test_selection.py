@@ -345,8 +345,10 @@ class _Fitted:
 
 
 def fitted_at(effect: str, slot: Slot, number: int, **values: float) -> Any:
-    """An effect at a place with its parameters at ``values``, beside J."""
-    made = candidates_of([known_effects()[effect]], [MOTOR, GEARBOX, NUT], SCALES)
+    """An effect at a place with its parameters at ``values``, beside J; every effect may act anywhere."""
+    known = known_effects()[effect]
+    anywhere = tuple(replace(v, slots=None) for v in known.variants)
+    made = candidates_of([replace(known, variants=anywhere)], [MOTOR, GEARBOX, NUT], SCALES)
     candidate = next(c for c in made if c.slot.name == slot.name and c.number == number)
     unknowns = Unknowns((J, *unknowns_of(candidate, {p.name: p.at_start for p in candidate.parameters})))
     named = {f"{candidate.slot.component}.{candidate.component}.{k}": v for k, v in values.items()}
@@ -370,6 +372,24 @@ def test_behind_a_gear_the_same_law_has_another_speed_and_the_torque_that_makes_
     )
     back: Any = room.geared(found, winner)  # type: ignore[arg-type]
     assert back.fit.vector == pytest.approx(winner.fit.vector)
+
+
+@pytest.mark.parametrize(
+    ("effect", "number", "at_gear", "at_motor"),
+    [
+        ("position-friction", 1, {"c2": 6.0, "z_2": 2.0, "w_2": 0.5}, {"c2": 0.2, "z_2": 60.0, "w_2": 15.0}),
+        ("friction-run-in", 0, {"dF": 6.0, "d_r": 3.0}, {"dF": 0.2, "d_r": 90.0}),
+    ],
+)
+def test_a_law_over_angle_or_distance_is_geared_as_one_over_speed(
+    effect: str, number: int, at_gear: dict[str, float], at_motor: dict[str, float]
+):
+    winner, other = fitted_at(effect, GEARBOX, number, **at_gear), fitted_at(effect, MOTOR, number)
+    found: Any = room.geared(winner, other)  # type: ignore[arg-type]
+    values = found.fit.unknowns.named(found.fit.vector)
+    assert {name.rpartition(".")[2]: value for name, value in values.items()} == pytest.approx(
+        {"J": J.start, **at_motor}
+    )
 
 
 def test_only_another_shaft_with_the_same_form_of_a_law_over_speed_or_angle_is_geared():

@@ -275,7 +275,9 @@ def test_a_library_under_another_name_is_no_library(tmp_path: Path) -> None:
             wrong.writestr(name.replace("lag2.so", "libhelper.so"), right.read(name))
     report = check_fmu(path, cycles=2)
     assert line(report, "platform").verdict is Verdict.FAILED
-    assert line(report, "platform").text.startswith("binaries/linux64 does not hold lag2.so")
+    assert line(report, "platform").text.startswith(
+        "binaries/linux64 does not hold lag2.so, but libhelper.so; "
+    )
 
 
 def test_what_is_no_fmu_is_an_input_error(tmp_path: Path) -> None:

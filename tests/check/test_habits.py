@@ -121,6 +121,16 @@ def test_a_slow_fmu_is_tried_over_its_begin(monkeypatch: pytest.MonkeyPatch) -> 
     assert runs.verdict is Verdict.WARNING
 
 
+@pytest.mark.parametrize(("slowness", "verdict"), [(30_000, Verdict.WARNING), (30_000_000, Verdict.FAILED)])
+def test_one_that_becomes_slow_is_told_from_one_that_hangs(slowness: int, verdict: Verdict) -> None:
+    """50 of 100 steps take 30 ms each, or the first of them never returns; the deadline is 1 s."""
+    slow = habits2(f"SLOW={slowness}", "SLOW_FROM=0.495")
+    report = check_fmu(slow, deadline_s=1.0, limit_s=1e-6, cycles=1)
+    runs = next(f for f in report.findings if f.name == "runs")
+    assert runs.verdict is verdict
+    assert ("s of 1 s: all of it takes more than 1 s" in runs.text) is (verdict is Verdict.WARNING)
+
+
 def test_where_a_description_lies_too_deep_is_said(tmp_path: Path) -> None:
     deeper = tmp_path / "deeper.fmu"
     with zipfile.ZipFile(habits2()) as source, zipfile.ZipFile(deeper, "w") as target:

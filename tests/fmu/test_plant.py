@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 from thsa_cosim.errors import FmuError, ParameterError
 from thsa_cosim.fmu import Plant, SimulationFailure, Status
+from thsa_cosim.fmu.plan import Plan
 from thsa_cosim.signals import FloatArray, Signals
 
 TIME = np.linspace(0.0, 1.0, 101)
@@ -340,3 +342,14 @@ def test_the_loop_releases_the_gil() -> None:
         stop.set()
         thread.join()
     assert len(ticks) > 10
+
+
+def test_an_fmu_that_overwrites_the_communication_points_is_blamed_for_it() -> None:
+    with Plant.open(build.lag2()) as plant:
+        instance = plant._new_instance()
+        plan = Plan(instance, None, ("y",), np.linspace(0.0, 1.0, 11))
+        assert plan.recorded({"y": np.zeros(11)}).names == ("y",)
+        spoilt = SimpleNamespace(grid=SimpleNamespace(times=np.zeros(11)), units={})
+        with pytest.raises(SimulationFailure, match="overwritten memory that is not its own") as caught:
+            Plan.recorded(spoilt, {"y": np.zeros(11)})  # type: ignore[arg-type]
+    assert caught.value.status is Status.CRASH

@@ -5,7 +5,8 @@
  * ONCE: one instance per process, and never another. FIXED_STEP: steps of 0.01 s only. FIRST_VALUE=x: the output is
  * x before the first step. OTHER_START: the parameters start elsewhere than the model description says. PARTS: no step is
  * done further than 4 ms; what is left is for the next call. LICENCE=t: lost after so many seconds. JUMPS: y jumps by 1
- * after 0.2345 s. EULER: one explicit step per communication step. SLOW=t: each step takes so many microseconds.
+ * after 0.2345 s. EULER: one explicit step per communication step. SLOW=t: each step takes so many microseconds,
+ * from SLOW_FROM on.
  * OWN_STEP: whole steps of 10 ms, as many as it takes to reach the end, as 20-sim does.
  * NAN_ABOVE=u: y is no number where the input is above u. ALONE: no other instance of any such FMU lives in the process.
  * FIRST_WINS: every instance of a process has the parameters of the first one.
@@ -129,7 +130,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
     if (fabs(h - 0.01) > 1e-9) return fmi2Error;
 #endif
 #ifdef SLOW
-    usleep(SLOW);
+#ifndef SLOW_FROM
+#define SLOW_FROM 0.0
+#endif
+    if (t >= SLOW_FROM) usleep(SLOW);
 #endif
 #ifdef LICENCE
     if (t + h > LICENCE) {

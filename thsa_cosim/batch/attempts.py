@@ -42,9 +42,9 @@ class Attempt:
 
     @property
     def is_inherited(self) -> bool:
-        """Whether an earlier run of its process may be to blame: memory is used up, or a second instance refused."""
+        """Whether an earlier run of its process may be to blame: memory used up or spoilt, no second instance."""
         refused = self.outcome.status is Status.LOAD_ERROR and "Instantiate" in self.outcome.reason
-        return (refused or self.outcome.status is Status.MEMORY) and not self.was_first
+        return (refused or self.outcome.status in (Status.MEMORY, Status.CRASH)) and not self.was_first
 
 
 class Batch:

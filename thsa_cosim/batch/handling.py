@@ -209,6 +209,14 @@ def largest_change(
     return changes[worst], worst
 
 
+def said(change: float, name: str) -> str:
+    """A change of ``largest_change`` in words."""
+    if change > _CONSTANT:
+        return f"moves {name}, which is constant otherwise"
+    return f"changes {name} by {change:.1e} of its range"
+
+
+_CONSTANT = 1e6
 _JUMP = 0.1
 """Share of its range that a signal jumps by between two samples."""
 _SWITCHING = 0.1

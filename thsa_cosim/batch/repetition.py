@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from thsa_cosim.batch.handling import largest_change
+from thsa_cosim.batch.handling import largest_change, said
 from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.local import LocalRunner
 from thsa_cosim.batch.outcome import Outcome
@@ -58,8 +58,8 @@ def _compare(plain: Experiment, changed: Mapping[str, float], options: Mapping[s
         return Repetition(first)
     if second.signals is None:
         return Repetition(first, f"a second run in one process fails ({second.status}: {second.reason})")
-    change, worst = largest_change(alone.signals.values, second.signals.values)
-    return Repetition(first, f"a second run in one process changes {worst} by {change:.1e} of its range")
+    changed_by = said(*largest_change(alone.signals.values, second.signals.values))
+    return Repetition(first, f"a second run in one process {changed_by}")
 
 
 def _alone(plain: Experiment, values: Mapping[str, float], options: Mapping[str, Any]) -> Outcome:

@@ -181,6 +181,7 @@ class Worker:
                     signals = None
         except SimulationFailure as failure:
             status, reason = failure.status, failure.reason
+            self._leaves |= status is Status.CRASH  # what it has spoilt is not known
         except MemoryError:
             limited = self._setup.memory_limit is not None
             status, reason = Status.MEMORY if limited else Status.MACHINE, "memory ran out"

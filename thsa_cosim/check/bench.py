@@ -28,6 +28,9 @@ _LONG = 3000
 _FEWEST = 10
 """Communication points before an FMU ends the simulation itself, below which nothing can be tried."""
 _ENDED = re.compile(r"ended the simulation at t = (\S+) s")
+_KILLED = re.compile(r"while stepping at t = (\S+) s")
+_BEFORE = 0.9
+"""Share of the time at which a run was killed, up to which it is run again."""
 _BY_INPUTS = (Status.NOT_FINITE, Status.FMI_ERROR, Status.FMI_DISCARD, Status.INCOMPLETE)
 """How a run may fail because its inputs ask too much."""
 
@@ -224,15 +227,26 @@ class Bench:
             outcome = self._run_once()
             if outcome.status is Status.TIMEOUT:
                 continue
-            if not outcome.ok or not is_slow(outcome.duration_s, share, self._deadline):
+            slow = outcome.ok and is_slow(outcome.duration_s, share, self._deadline)
+            if not outcome.ok or not (slow or self._is_slow_later(killed, whole)):
                 break
-            fast = int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))
+            fast = int(np.clip(points * LONGEST_RUN / max(outcome.duration_s, 1e-9), 2, points))
             self._shorten(whole[:fast])
             self._cut = True
             outcome = self._try()
             done = f"{np.ptp(self._time):.3g} s of {np.ptp(whole):g} s"
             return outcome, f"; only {done}: all of it takes more than {self._deadline:g} s (see --deadline)"
         return killed, ""
+
+    def _is_slow_later(self, killed: Outcome, whole: FloatArray) -> bool:
+        """Whether a run that was killed had got there slowly; else it was quick and hangs there."""
+        found = _KILLED.search(killed.reason)
+        before = whole[whole <= _BEFORE * float(found[1])] if found else whole[:0]
+        if len(before) < _FEWEST:
+            return False
+        self._shorten(before)
+        outcome = self._run_once()
+        return outcome.status is Status.TIMEOUT or is_slow(outcome.duration_s, 1.0, self._deadline)
 
     def _try(self) -> Outcome:
         """Run once; find out how inputs are to be given, and run so."""

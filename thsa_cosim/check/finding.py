@@ -50,11 +50,14 @@ class CheckReport:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict among the lines that were tried; a wrong reset is a warning, as nobody has to use it."""
+        """The worst verdict among the lines that were tried; a wrong reset is a warning, as nobody has to use it.
+
+        An FMU that could not be run is not "ok".
+        """
         found = {
             Verdict.WARNING if f.verdict is Verdict.FAILED and "reset" in f.name else f.verdict
             for f in self.findings
-        }
+        } | {Verdict.WARNING for f in self.findings if f.name == "runs" and f.verdict is Verdict.NOT_TRIED}
         return next((v for v in (Verdict.FAILED, Verdict.WARNING) if v in found), Verdict.OK)
 
     @property

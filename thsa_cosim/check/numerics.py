@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from thsa_cosim.batch import Outcome, Status
-from thsa_cosim.batch.handling import HandlingTrial, largest_change
+from thsa_cosim.batch.handling import HandlingTrial, largest_change, said
 from thsa_cosim.batch.own_step import own_step
 from thsa_cosim.check.finding import Verdict
 from thsa_cosim.fmu.plant import Kind
@@ -205,7 +205,7 @@ def judge_declared(first: Signals, outcome: Outcome) -> Judged | None:
     change, worst = largest_change(first.values, outcome.signals.values)
     if change <= AGREE:
         return None
-    text = f"set to the values that it declares, its parameters change {worst} by {change:.1e} of its range"
+    text = f"setting its parameters to the values that it declares {said(change, worst)}"
     return Verdict.WARNING, f"{text}: it starts with others", {"change": change}
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from thsa_cosim.batch import Job, LocalRunner, Outcome
-from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined
+from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined, said
 from thsa_cosim.batch.own_step import moves_within
 from thsa_cosim.check import coupling, numerics
 from thsa_cosim.check.bench import Bench
@@ -386,7 +386,7 @@ class Trials(Bench):
             return
         change, worst = largest_change(self._first.values, found)
         verdict = Verdict.WARNING if change < 1e-9 else Verdict.FAILED
-        text = f"{what} changes {worst} by {change:.1e} of its range"
+        text = f"{what} {said(change, worst)}"
         if name == "fresh instance" and self._is_ok("new process"):
             text += ", a new process nothing: the library keeps something (static variables, random numbers)"
         elif name == "new process":

@@ -137,4 +137,4 @@ def step_with_events(instance: Fmi3Instance, plan: Plan, progress: FloatArray) -
     """Run an initialised instance through ``plan``; SimulationFailure if it does not reach the end."""
     rows = _Stepping(instance, plan, progress, float(plan.grid.times[0])).run()
     values = {name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(plan.outputs)}
-    return Signals(plan.grid.times, values, plan.units)
+    return plan.recorded(values)

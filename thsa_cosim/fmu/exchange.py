@@ -258,4 +258,4 @@ def integrate(instance: Instance, plan: Plan, progress: FloatArray, tolerance: f
     progress[0] = Phase.TERMINATE
     instance.terminate()
     values = {name: np.ascontiguousarray(run.rows[:, i]) for i, name in enumerate(plan.outputs)}
-    return Signals(plan.grid.times, values, plan.units)
+    return plan.recorded(values)

@@ -1,12 +1,13 @@
 """One experiment prepared for one FMU: communication points and tables of input values."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thsa_cosim.errors import ParameterError
+from thsa_cosim.fmu.failure import SimulationFailure, Status
 from thsa_cosim.fmu.inputs import (
     communication_grid,
     input_mode,
@@ -59,6 +60,15 @@ class Plan:
         """Kept here by ``stepping`` between runs."""
         self.courses: dict[float, Any] = {}
         """Kept here by ``trajectory`` between runs."""
+
+    def recorded(self, values: Mapping[str, FloatArray]) -> Signals:
+        """The outputs at the communication points; SimulationFailure if the FMU has spoilt those."""
+        try:
+            return Signals(self.grid.times, values, self.units)
+        except ValueError:
+            raise SimulationFailure(
+                Status.CRASH, "the FMU has overwritten memory that is not its own (the communication points)"
+            ) from None
 
     def _rows(self, table: FloatArray, wanted: NDArray[np.bool_]) -> list[tuple[Channel, NDArray[Any]]]:
         """One contiguous (n, variables) table per data type, of the ``wanted`` columns."""

@@ -113,10 +113,11 @@ def missing_binary(description: FmuDescription) -> str:
     if all(any(parts[1] in wanted and parts[2:] == [file] for parts in files) for file in here):
         return ""
     remedy = "export it for this platform"
-    if any(name.startswith("sources/") for name in names):
+    if any(name.startswith("sources/") and name.endswith(".c") for name in names):
         remedy = "it has C sources: `thsa-cosim check --compile OUT.fmu` builds them"
     if set(folders) & set(wanted):
-        return f"binaries/{wanted[0]} does not hold {' and '.join(here)}; {remedy}"
+        there = ", ".join(parts[-1] for parts in files if parts[1] in wanted)
+        return f"binaries/{wanted[0]} does not hold {' and '.join(here)}, but {there}; {remedy}"
     return f"no library for {wanted[0]} (it has {', '.join(folders) or 'none at all'}); {remedy}"
 
 

@@ -213,7 +213,7 @@ def step_through(instance: Instance, plan: Plan, progress: FloatArray, compiled:
             rows[column] = row
     values = dict(zip(plan.outputs, rows, strict=True))
     if tables.signals is None:
-        tables.signals = Signals(plan.grid.times, values, plan.units)
+        tables.signals = plan.recorded(values)
         return tables.signals
     # The time axis was checked when the first run built its signals.
     signals = copy.copy(tables.signals)

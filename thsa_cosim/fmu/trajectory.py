@@ -110,7 +110,7 @@ def follow(instance: Instance, plan: Plan, progress: FloatArray, tolerance: floa
         instance.check(code, FUNCTION, float(struct.reached))
     values = dict(zip(plan.outputs, results, strict=True))
     if course.signals is None:
-        course.signals = Signals(plan.grid.times, values, plan.units)
+        course.signals = plan.recorded(values)
         return course.signals
     # The time axis was checked when the first run built its signals.
     signals = copy.copy(course.signals)

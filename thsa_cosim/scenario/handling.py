@@ -1,7 +1,9 @@
 """How the FMUs of a study are run: what the scenario fixes, else what trials find (inputs, processes)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -40,8 +42,9 @@ def settle(spec: SimulationTable, experiments: Sequence[Experiment]) -> Settled:
     settled = settle_handling(spec, experiments)
     modes, kind = settled.modes, settled.interface
     found: dict[str, Repetition] = {}
+    foreign_of = cache(_foreign)  # many experiments, one FMU
     for experiment, mode in zip(experiments, modes, strict=True):
-        foreign = _foreign(experiment)
+        foreign = foreign_of(experiment.fmu)
         if foreign is not None and foreign.sha256 not in found:
             found[foreign.sha256] = _repetition(spec, foreign, replace(experiment, input_mode=mode), kind)
     faults = [repetition for repetition in found.values() if repetition.fault]
@@ -56,9 +59,9 @@ def settle(spec: SimulationTable, experiments: Sequence[Experiment]) -> Settled:
     return replace(settled, notes=(*settled.notes, kept), limits=limits)
 
 
-def _foreign(experiment: Experiment) -> FmuDescription | None:
+def _foreign(fmu: Path) -> FmuDescription | None:
     try:
-        description = read_description(experiment.fmu)
+        description = read_description(fmu)
     except FmuError:
         return None  # said elsewhere
     return None if is_ours(description) else description
@@ -84,8 +87,9 @@ def settle_handling(
     """
     found: dict[str, HandlingTrial] = {}
     digests: dict[int, str] = {}
+    read = cache(read_description)
     for index, experiment in enumerate(experiments):
-        description = _in_question(spec, experiment)
+        description = _in_question(spec, experiment, read)
         if description is None:
             continue
         digests[index] = description.sha256
@@ -107,12 +111,14 @@ def settle_handling(
     return Settled(interface, tuple(modes), tuple(note for note in notes if note))
 
 
-def _in_question(spec: SimulationTable, experiment: Experiment) -> FmuDescription | None:
+def _in_question(
+    spec: SimulationTable, experiment: Experiment, read: Callable[[Path], FmuDescription]
+) -> FmuDescription | None:
     """The FMU's description if there is anything to find out about its inputs."""
     if spec.interface == "model-exchange" or experiment.inputs is None:
         return None
     try:
-        description = read_description(experiment.fmu)
+        description = read(experiment.fmu)
         linear = [
             v for v in input_variables(description, experiment.inputs) if is_linear(experiment.inputs, v)
         ]

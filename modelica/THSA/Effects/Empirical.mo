@@ -15,7 +15,9 @@ block Empirical "Terms in speed, position, distance and load, for what no effect
   parameter Real k_NNs = 0 "Coefficient of N^2 sgn(v)";
   parameter Real k_a = 0 "Coefficient of |v|";
   parameter Real k_f = 0 "Coefficient of exp(-|v|/v_f) sgn(v)";
-  parameter Real v_f(min=1e-12) = 1 "Speed over which that falls";
+  parameter Real k_g = 0 "Coefficient of exp(-(v/v_f)^2) sgn(v)";
+  parameter Real k_h = 0 "Coefficient of sgn(v)/(1 + (v/v_f)^2)";
+  parameter Real v_f(min=1e-12) = 1 "Speed over which these fall";
   parameter Real k_d = 0 "Coefficient of exp(-d/d_f) sgn(v) with the distance d since the start";
   parameter Real d_f(min=1e-12) = 1 "Distance over which that falls";
   parameter Real k_sin = 0 "Coefficient of sin(w z)";
@@ -27,6 +29,8 @@ equation
   F = k_1 + (k_vv*v*s + k_vvv*v^2)*v + (k_z + k_zz*z + (k_zs + k_zzs*z)*s + k_zv*v)*z
     + k_N*N + (k_Ns*s + k_Nv*v)*noEvent(abs(N)) + k_NNs*N^2*s + k_a*noEvent(abs(v))
     + (if k_f > 0 or k_f < 0 then k_f*exp(-noEvent(abs(v))/v_f)*s else 0)
+    + (if k_g > 0 or k_g < 0 then k_g*exp(-(v/v_f)^2)*s else 0)
+    + (if k_h > 0 or k_h < 0 then k_h/(1 + (v/v_f)^2)*s else 0)
     + (if k_d > 0 or k_d < 0 then k_d*exp(-d/d_f)*s else 0)
     + (if k_sin > 0 or k_sin < 0 or k_cos > 0 or k_cos < 0 then k_sin*sin(w*z) + k_cos*cos(w*z) else 0);
   annotation(Documentation(info="<html><p>No physics is meant by it: terms are chosen by what the recordings show, one coefficient

@@ -140,6 +140,16 @@ def test_dead_time_costs_its_voltage(superset: Plant):
     assert after["i_q"] == pytest.approx(before["i_q"], rel=1e-6)
 
 
+def test_dead_time_ripples_with_the_rotor_against_the_current(superset: Plant):
+    block, amplitude, n = "inverterEffect.inverterDeadTime", (0.2, -0.3), 24.0
+    values = {"U_d": 1.5, "i_r": 0.1, "u_s": amplitude[0], "u_c": amplitude[1], "n": n}
+    found = run(superset, {f"{block}.{k}": x for k, x in values.items()}, ("inverterEffect.du", "motor.phi"))
+    ripple = amplitude[0] * np.sin(n * found["motor.phi"]) + amplitude[1] * np.cos(n * found["motor.phi"])
+    expected = -(1.5 + ripple) * np.clip(found["i_q"] / 0.1, -1.0, 1.0)
+    assert np.ptp(found["motor.phi"]) > 2.0 * np.pi / n
+    np.testing.assert_allclose(found["inverterEffect.du"], expected, atol=1e-9)
+
+
 def test_self_heating_settles_where_loss_and_cooling_balance(superset: Plant):
     h, tau, alpha_R, alpha_psi = 30.0, 0.05, 3.93e-3, -1.2e-3
     block = "windingEffect.windingSelfHeating"
@@ -327,16 +337,25 @@ def energy(q: Mapping[str, np.ndarray], fading: float) -> np.ndarray:
 
 WAVE = 3e3
 #: Where a term is tried, its output, and what it is with the shapes below.
-SHAPES = {"v_f": 2e-3, "d_f": 3e-3, "w": WAVE, "n": 2.0, "i_s": 0.5, "T_f": 0.8}
+SHAPES = {"v_f": 2e-3, "d_f": 3e-3, "w": WAVE, "n": 2.0, "i_s": 0.5, "T_f": 0.8, "z_b": 1e-3, "w_b": 5e-4}
 PLACES = {
     "Empirical": ("screwEffect", "F"),
+    "EmpiricalRise": ("screwEffect", "F"),
+    "EmpiricalTorque": ("shaftEffect", "tau"),
     "EmpiricalDeflection": ("contactEffect", "e"),
     "EmpiricalHeating": ("windingEffect", "g_R"),
     "EmpiricalTorqueConstant": ("torqueEffect", "g_t"),
     "EmpiricalVoltage": ("inverterEffect", "du"),
     "EmpiricalSensor": ("currentSensorEffect", "d"),
 }
-READ = {"screw": "vszN", "contact": ("phi",), "winding": "P", "torque": ("i_q",), "inverter": ("i_q",)}
+READ = {
+    "screw": "vszN",
+    "shaft": ("phi", "T"),
+    "contact": ("phi",),
+    "winding": "P",
+    "torque": ("i_q",),
+    "inverter": ("i_q",),
+}
 TERMS: dict[str, Law] = {
     "1": lambda q: np.ones(TIME.size),
     "|v|": lambda q: np.abs(q["v"]),
@@ -352,10 +371,16 @@ TERMS: dict[str, Law] = {
     "|N| v": lambda q: np.abs(q["N"]) * q["v"],
     "N^2 sgn(v)": lambda q: q["N"] ** 2 * q["s"],
     "exp(-|v|/{v_f}) sgn(v)": lambda q: np.exp(-np.abs(q["v"]) / SHAPES["v_f"]) * q["s"],
+    "exp(-(v/{v_f})^2) sgn(v)": lambda q: np.exp(-((q["v"] / SHAPES["v_f"]) ** 2)) * q["s"],
+    "sgn(v)/(1 + (v/{v_f})^2)": lambda q: q["s"] / (1.0 + (q["v"] / SHAPES["v_f"]) ** 2),
+    "exp(-((z - {z_b})/{w_b})^2/2) sgn(v)": lambda q: np.exp(-(((q["z"] - 1e-3) / 5e-4) ** 2) / 2.0) * q["s"],
     "exp(-d/{d_f}) sgn(v)": lambda q: np.exp(-distance(q) / SHAPES["d_f"]) * q["s"],
     "sin({w} z)": lambda q: np.sin(WAVE * q["z"]),
     "cos({w} z)": lambda q: np.cos(WAVE * q["z"]),
     "sin({n} phi)": lambda q: np.sin(2.0 * q["phi"]),
+    "cos({n} phi)": lambda q: np.cos(2.0 * q["phi"]),
+    "T sin({n} phi)": lambda q: q["T"] * np.sin(2.0 * q["phi"]),
+    "T cos({n} phi)": lambda q: q["T"] * np.cos(2.0 * q["phi"]),
     "(cos({n} phi) - 1)": lambda q: np.cos(2.0 * q["phi"]) - 1.0,
     "E in the resistance": lambda q: energy(q, SHAPES["T_f"]),
     "E in the flux": lambda q: energy(q, SHAPES["T_f"]),
@@ -369,10 +394,25 @@ TERMS: dict[str, Law] = {
     "u |u|": lambda q: q["u"] * np.abs(q["u"]),
 }
 #: How large a term is made.
-SIZES = {"F": 200.0, "e": 1e-6, "g_R": 0.05, "g_psi": 0.01, "g_t": 0.02, "g_e": 0.02, "du": 2.0, "d": 0.1}
+SIZES = {
+    "F": 200.0,
+    "tau": 0.5,
+    "e": 1e-6,
+    "g_R": 0.05,
+    "g_psi": 0.01,
+    "g_t": 0.02,
+    "g_e": 0.02,
+    "du": 2.0,
+    "d": 0.1,
+}
 
 
-@pytest.mark.parametrize("effect", EMPIRICAL, ids=[e.name for e in EMPIRICAL])
+#: Terms that are not proportional to their coefficient: a width, a time.
+OWN = ("EmpiricalClearance", "EmpiricalDelay")
+LINEAR = [e for e in EMPIRICAL if e.variants[0].block not in OWN]
+
+
+@pytest.mark.parametrize("effect", LINEAR, ids=[e.name for e in LINEAR])
 def test_a_term_of_the_empirical_law_is_what_its_text_says(superset: Plant, effect: Effect):
     (variant,) = effect.variants
     slot, usual = PLACES[variant.block]
@@ -397,6 +437,24 @@ def test_a_term_of_the_empirical_law_is_what_its_text_says(superset: Plant, effe
         summed = p.name in ("k_d", "k_R", "k_psi")
         allowed = (1e-2 if summed else 5e-6) * SIZES[output]
         np.testing.assert_allclose(found[f"{slot}.{output}"], expected, atol=allowed)
+
+
+def test_the_empirical_dead_zone_takes_its_width_out_of_the_deflection(superset: Plant):
+    gap = 2e-5
+    found = run(
+        superset, {"contactEffect.empiricalClearance.gap": gap}, ("contactEffect.delta", "contactEffect.e")
+    )
+    expected = -np.clip(found["contactEffect.delta"], -0.5 * gap, 0.5 * gap)
+    np.testing.assert_allclose(found["contactEffect.e"], expected, atol=1e-9)
+
+
+def test_the_empirical_delay_is_the_value_a_while_ago(superset: Plant):
+    delay = 0.02
+    sensor = "velocitySensorEffect"
+    found = run(superset, {f"{sensor}.empiricalDelay.tau": delay}, (f"{sensor}.u", f"{sensor}.d"))
+    true = found[f"{sensor}.u"]
+    expected = np.interp(TIME - delay, TIME, true) - true
+    assert np.sqrt(np.mean((found[f"{sensor}.d"] - expected) ** 2)) < 0.02 * np.sqrt(np.mean(expected**2))
 
 
 def test_run_in_falls_with_the_distance_whatever_the_direction(superset: Plant):

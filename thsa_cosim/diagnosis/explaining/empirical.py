@@ -27,6 +27,7 @@ from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import values_of
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
+from thsa_cosim.diagnosis.choosing.selection import Say
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -37,6 +38,7 @@ from thsa_cosim.diagnosis.results import EmpiricalLaw, EmpiricalTerm, Value
 from thsa_cosim.export import export_fmu
 from thsa_cosim.export.compile import native_platform
 from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
+from thsa_cosim.study import export_digest, is_made_from, note_made_from
 
 #: At most so many terms: a law of more says no more than a plot.
 _TERMS = 3
@@ -59,6 +61,14 @@ _FALL = _shape("v_f", "V", "speed over which it falls", (0.03, 0.1, 0.3))
 _DISTANCE = _shape("d_f", "D", "distance over which it falls", (0.1, 0.5))
 _WAVE = _shape("w", "W", "wave number", (1.0, 2.0), scanned=True)
 _PERIODS = _shape("n", "1", "periods per revolution", (1.0, 2.0))
+_TURNS = _shape("n", "W", "periods per revolution", (1.0, 2.0), scanned=True)
+_PLACE = EffectParameter(
+    "z_b", "Z", 0.5, "position of the rise", "shape", -1.2, 1.2, starts=(0.1, 0.3, 0.5, 0.7, 0.9)
+)
+_WIDTH = EffectParameter("w_b", "Z", 0.1, "width of the rise", "shape", 0.01, 0.6, starts=(0.1,))
+_TAKEN_UP = EffectParameter(
+    "s_0", "1", 0.5, "share taken up at the start", "shape", 0.0, 1.0, starts=(0.0, 1.0)
+)
 _SIGN = _shape("i_s", "I", "current over which the sign turns", (0.01, 0.05))
 _FADING = EffectParameter(
     "T_f", "s", 10.0, "time over which E fades", role="shape", lower=0.5, upper=1e5, starts=(5.0, 100.0)
@@ -80,8 +90,25 @@ _LIBRARY: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
         (_k("k_Nv", "1/V", "|N| v"),),
         (_k("k_NNs", "1/F", "N^2 sgn(v)"),),
         (_k("k_f", "F", "exp(-|v|/{v_f}) sgn(v)"), _FALL),
+        (_k("k_g", "F", "exp(-(v/{v_f})^2) sgn(v)"), _FALL),
+        (_k("k_h", "F", "sgn(v)/(1 + (v/{v_f})^2)"), _FALL),
         (_k("k_d", "F", "exp(-d/{d_f}) sgn(v)"), _DISTANCE),
         (_k("k_sin", "F", "sin({w} z)", 0.01), _k("k_cos", "F", "cos({w} z)", 0.01), _WAVE),
+    ),
+    ("FrictionEffect", "EmpiricalRise"): (
+        (_k("k_b", "F", "exp(-((z - {z_b})/{w_b})^2/2) sgn(v)"), _PLACE, _WIDTH),
+    ),
+    ("ShaftEffect", "EmpiricalTorque"): (
+        (_k("k_sin", "F", "sin({n} phi)", 0.01), _k("k_cos", "F", "cos({n} phi)", 0.01), _TURNS),
+        (_k("k_Tsin", "1", "T sin({n} phi)", 0.01), _k("k_Tcos", "1", "T cos({n} phi)", 0.01), _TURNS),
+    ),
+    ("ContactEffect", "EmpiricalClearance"): (
+        (
+            EffectParameter(
+                "gap", "m", 2e-5, "coefficient of a dead zone of this width", lower=0.0, upper=0.05
+            ),
+            _TAKEN_UP,
+        ),
     ),
     ("ContactEffect", "EmpiricalDeflection"): (
         (_k("k_sin", "m", "sin({n} phi)", 2e-6), _k("k_cos", "m", "(cos({n} phi) - 1)", 2e-6), _PERIODS),
@@ -106,6 +133,18 @@ _LIBRARY: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
         (_k("k_u", "1", "u", 0.01),),
         (_k("k_uu", "1/I", "u |u|", 0.01),),
     ),
+    ("SensorEffect", "EmpiricalDelay"): (
+        (
+            EffectParameter(
+                "tau", "s", 2e-3, "coefficient of a delay by this time", lower=1e-5, upper=0.2, neutral=1e-5
+            ),
+        ),
+    ),
+}
+#: Blocks that have states, or more shapes than a search can try everywhere, and the slots that they are offered in.
+_ONLY: Mapping[str, tuple[str, ...]] = {
+    "EmpiricalRise": ("screw", "guide"),
+    "EmpiricalDelay": ("velocitySensor",),
 }
 
 
@@ -116,7 +155,7 @@ def _effect(interface: str, block: str, parameters: tuple[EffectParameter, ...])
         physics=f"{parameters[0].description} in a sum of such terms",
         source="Brunton, Proctor, Kutz, PNAS 113 (2016) 3932",
         signature="whatever structure the effects with a name leave",
-        variants=(Variant(interface, block, parameters),),
+        variants=(Variant(interface, block, parameters, _ONLY.get(block)),),
     )
 
 
@@ -142,6 +181,7 @@ class LawSearch:
     folder: Path
     open_runner: OpenRunner
     machine: Machine
+    say: Say = lambda _: None
 
     def find(self) -> Attribution | None:
         """The terms that pass the gate; None if there is none, or nothing can be simulated."""
@@ -157,13 +197,12 @@ class LawSearch:
         terms = candidates_of(EMPIRICAL, slots, {})
         beside = source_beside(self.spec.model, self.spec.package)
         source = extended_class(name, base, [*own, *terms], shapes, beside=beside)
-        file = write_extended(self.folder, name, source)
-        fmu = export_fmu(
-            str(file),
-            package=self.spec.package,
-            output=self.folder / f"{name}.fmu",
-            platforms=(native_platform().fmi3,),
-        )
+        fmu, platforms = self.folder / f"{name}.fmu", (native_platform().fmi3,)
+        made_from = export_digest(source, self.spec.package, platforms)
+        if not is_made_from(fmu, made_from):
+            file = write_extended(self.folder, name, source)
+            export_fmu(str(file), package=self.spec.package, output=fmu, platforms=platforms)
+            note_made_from(fmu, made_from)
         trials = with_fmu(self.trials, fmu)
         cases = [t.case for t in trials if t.part == "fit"]
         opening = partial(self.open_runner, simulation)
@@ -184,6 +223,7 @@ class LawSearch:
                 seed=self.scenario.seed,
                 most=_TERMS,
                 machine=self.machine,
+                say=self.say,
             )
         return found if found is not None and found.accepted else None
 

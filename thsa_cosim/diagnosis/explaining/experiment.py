@@ -10,7 +10,7 @@ from itertools import islice, permutations, product
 
 import numpy as np
 
-from thsa_cosim.batch import Experiment, Job, Status
+from thsa_cosim.batch import Experiment, Job, Runner, Status
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS
 from thsa_cosim.diagnosis.choosing.score import Scored, fixed_shapes
@@ -66,8 +66,13 @@ def separating_experiment(
     one = next((r for r in kept if r.rivals), kept[0])
     assert one.accepted is not None
     models = (one.accepted, *one.rivals[:MOST_RIVALS])
-    plan = _Plan(scenario, spec, fit, one, models, stated, open_runner)
-    return plan.best()
+    menu = _menu(spec, fit)
+    if not menu:
+        return None
+    experiments = [replace(_experiment(fit[0], own), name=profile.name) for profile, own in menu]
+    # One set of processes for all of it: opening them for every profile took longer than the runs.
+    with open_runner(scenario.simulation, experiments) as runner:
+        return _Plan(spec, fit, one, models, stated, menu, runner).best()
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,16 +89,16 @@ class _Ran:
 class _Plan:
     """The search over the menu; ``models``: the accepted effect and its rivals, as fitted in ``one`` round.
 
-    ``stated``: standard errors of the identified values.
+    ``stated``: standard errors of the identified values. ``menu``: profiles with their inputs; ``runner`` runs them.
     """
 
-    scenario: Scenario
     spec: DiagnoseSpec
     fit: Sequence[Trial]
     one: Round
     models: tuple[Scored, ...]
     stated: Mapping[str, float]
-    open_runner: OpenRunner
+    menu: Sequence[tuple[Profile, Signals]]
+    runner: Runner
 
     def best(self) -> SeparatingExperiment | None:
         """The best profile of those that keep the limits."""
@@ -102,7 +107,7 @@ class _Plan:
             return None
         if len(self.models) == 1:
             return self._sharpest(ran)
-        judged = [(self._gaps(r), self._effect(r), r) for r in self._promising(ran)]
+        judged = [(*self._judged(r), r) for r in self._promising(ran)]
         gaps, effect, best = max(judged, key=lambda one: _worth(min(one[0]), self._wanted(*one[1:])))
         worst = int(np.argmin(gaps))
         names = tuple(m.candidate.name for m in self.models)
@@ -127,75 +132,31 @@ class _Plan:
 
     def _ran(self) -> list[_Ran]:
         """Every profile of the menu that all models can run within the limits."""
-        recorded, spec = [t.case.inputs for t in self.fit], self.spec
-        assert spec.command is not None
-        time = self._time()
-        limits = spec.limits
-        menu = profiles(
-            time,
-            input_range(
-                recorded, spec.command, limits.range.get(spec.command), limits.rate.get(spec.command)
-            ),
-            None
-            if spec.load is None
-            else input_range(recorded, spec.load, limits.range.get(spec.load), limits.rate.get(spec.load)),
-            TRAVEL * travel(recorded, spec.command) if limits.travel is None else limits.travel,
-        )
-        inputs = [self._inputs(time, profile) for profile in menu]
         vectors = [m.fit.vector for m in self.models]
-        outcomes = self._run(menu, inputs, list(zip(self.models, vectors, strict=True)))
+        outcomes = self._run([p for p, _ in self.menu], list(zip(self.models, vectors, strict=True)))
         ran = []
-        for profile, own, signals in zip(menu, inputs, outcomes, strict=True):
+        for (profile, own), signals in zip(self.menu, outcomes, strict=True):
             runs = [s for s in signals if s is not None]
             if len(runs) == len(self.models) and all(self._keeps(s) for s in runs):
                 ran.append(_Ran(profile, own, tuple(map(self._weighted, runs)), _reached(runs[0])))
         return ran
 
-    def _time(self) -> FloatArray:
-        first = self.fit[0].case
-        step = float(np.median(np.diff(first.time)))
-        recorded = max(float(t.case.inputs.time[-1] - t.case.inputs.time[0]) for t in self.fit)
-        longest = min(LONGEST, recorded) if self.spec.limits.time is None else self.spec.limits.time
-        return np.asarray(
-            step * np.arange(int(min(longest, SAMPLES * step) / step + 1e-6) + 1), dtype=np.float64
-        )
-
     def _run(
-        self,
-        menu: Sequence[Profile],
-        inputs: Sequence[Signals],
-        vectors: Sequence[tuple[Scored, FloatArray]],
+        self, menu: Sequence[Profile], vectors: Sequence[tuple[Scored, FloatArray]]
     ) -> list[list[Signals | None]]:
         """The outputs of every profile (rows) under every model with its vector."""
-        first = self.fit[0]
-        experiments = [
-            replace(_experiment(first, own), name=p.name) for p, own in zip(menu, inputs, strict=True)
-        ]
         jobs = [
-            Job(e.name, self._values(model, vector), keep_signals=True)
-            for e, (model, vector) in product(experiments, vectors)
+            Job(profile.name, self._values(model, vector), keep_signals=True)
+            for profile, (model, vector) in product(menu, vectors)
         ]
-        if not jobs:
-            return []
-        with self.open_runner(self.scenario.simulation, experiments) as runner:
-            outcomes = iter(runner.run(jobs))
+        outcomes = iter(self.runner.run(jobs))
         return [
             [o.signals if o.status == Status.OK else None for o in islice(outcomes, len(vectors))]
-            for _ in experiments
+            for _ in menu
         ]
 
     def _values(self, model: Scored, vector: FloatArray) -> Mapping[str, float]:
         return {**fixed_shapes([model]), **model.fit.unknowns.assignments(vector, self.fit[0].group)}
-
-    def _inputs(self, time: FloatArray, profile: Profile) -> Signals:
-        """The recording's inputs with the profile in place of command and load, the others at their first value."""
-        recorded = self.fit[0].case.inputs
-        values = {name: np.full(time.size, recorded[name][0]) for name in recorded.names}
-        assert self.spec.command is not None
-        values[self.spec.command] = profile.command
-        if self.spec.load is not None and profile.load is not None:
-            values[self.spec.load] = profile.load
-        return Signals(time, values, recorded.units, recorded.held - {self.spec.command, self.spec.load})
 
     def _keeps(self, outputs: Signals) -> bool:
         """Whether every output stays in its limits, or near what was recorded."""
@@ -236,7 +197,7 @@ class _Plan:
         """(N, n) of a model's outputs in a profile per scale of each unknown; None if that cannot be simulated."""
         model, fit = self.models[number], self.models[number].fit
         moved = _stepped(fit)
-        (signals,) = self._run([ran.profile], [ran.inputs], [(model, vector) for vector in moved])
+        (signals,) = self._run([ran.profile], [(model, vector) for vector in moved])
         found = np.zeros((ran.outputs[number].size, len(moved)))
         for k, (own, vector) in enumerate(zip(signals, moved, strict=True)):
             taken = (vector[k] - fit.vector[k]) / fit.unknowns.scale[k]
@@ -245,13 +206,17 @@ class _Plan:
             found[:, k] = (self._weighted(own) - ran.outputs[number]) / taken
         return found
 
-    def _gaps(self, ran: _Ran) -> list[float]:
+    def _judged(self, ran: _Ran) -> tuple[list[float], float]:
+        """Expected gaps to every rival in a profile, and what the accepted effect does there."""
+        jacobians = [self._jacobian(ran, number) for number in range(len(self.models))]
+        return self._gaps(ran, jacobians), self._effect(ran, jacobians[0])
+
+    def _gaps(self, ran: _Ran, jacobians: Sequence[FloatArray | None]) -> list[float]:
         """Smallest expected gap between every rival and any other model, whichever of the two is true.
 
         The one that is not is fitted. That the accepted effect is the true one is what nobody knows yet.
         """
         count = len(self.models)
-        jacobians = [self._jacobian(ran, number) for number in range(count)]
         gaps = np.full((count, count), np.inf)
         for true, number in permutations(range(count), 2):
             jacobian, information = jacobians[number], self.models[number].fit.information
@@ -268,22 +233,19 @@ class _Plan:
 
     def _without(self, ran: Sequence[_Ran]) -> list[float]:
         """What the accepted effect does in every profile: squared distance of the outputs without it."""
-        runs = self._run(
-            [r.profile for r in ran], [r.inputs for r in ran], [(self.models[0], self._neutral())]
-        )
+        runs = self._run([r.profile for r in ran], [(self.models[0], self._neutral())])
         return [
             0.0 if own is None else float(np.sum((r.outputs[0] - self._weighted(own)) ** 2))
             for r, (own,) in zip(ran, runs, strict=True)
         ]
 
-    def _effect(self, ran: _Ran) -> float:
+    def _effect(self, ran: _Ran, jacobian: FloatArray | None) -> float:
         """What the accepted effect does in a profile beyond what the declared parameters can imitate."""
-        jacobian = self._jacobian(ran, 0)
         if jacobian is None:
             return 0.0
         model, fit = self.models[0], self.models[0].fit
         own = {p.variable for p in model.candidate.coefficients}
-        (signals,) = self._run([ran.profile], [ran.inputs], [(model, self._neutral())])
+        (signals,) = self._run([ran.profile], [(model, self._neutral())])
         if signals[0] is None:
             return 0.0
         declared = [k for k, u in enumerate(fit.unknowns.members) if u.name not in own and u.declared]
@@ -340,6 +302,39 @@ class _Plan:
                     separates=False, reached=one.reached, sharpens=sharpened,
                 )  # fmt: skip
         return best
+
+
+def _menu(spec: DiagnoseSpec, fit: Sequence[Trial]) -> list[tuple[Profile, Signals]]:
+    """Every profile of command and load within the limits of the inputs, with all inputs."""
+    recorded, limits = [t.case.inputs for t in fit], spec.limits
+    assert spec.command is not None
+    time = _time(spec, fit)
+    found = profiles(
+        time,
+        input_range(recorded, spec.command, limits.range.get(spec.command), limits.rate.get(spec.command)),
+        None
+        if spec.load is None
+        else input_range(recorded, spec.load, limits.range.get(spec.load), limits.rate.get(spec.load)),
+        TRAVEL * travel(recorded, spec.command) if limits.travel is None else limits.travel,
+    )
+    return [(profile, _inputs(spec, recorded[0], time, profile)) for profile in found]
+
+
+def _time(spec: DiagnoseSpec, fit: Sequence[Trial]) -> FloatArray:
+    step = float(np.median(np.diff(fit[0].case.time)))
+    recorded = max(float(t.case.inputs.time[-1] - t.case.inputs.time[0]) for t in fit)
+    longest = min(LONGEST, recorded) if spec.limits.time is None else spec.limits.time
+    return np.asarray(step * np.arange(int(min(longest, SAMPLES * step) / step + 1e-6) + 1), dtype=np.float64)
+
+
+def _inputs(spec: DiagnoseSpec, recorded: Signals, time: FloatArray, profile: Profile) -> Signals:
+    """The recording's inputs with the profile in place of command and load, the others at their first value."""
+    values = {name: np.full(time.size, recorded[name][0]) for name in recorded.names}
+    assert spec.command is not None
+    values[spec.command] = profile.command
+    if spec.load is not None and profile.load is not None:
+        values[spec.load] = profile.load
+    return Signals(time, values, recorded.units, recorded.held - {spec.command, spec.load})
 
 
 def _worth(gap: float, wanted: float) -> tuple[bool, float]:

@@ -1,15 +1,17 @@
 """The blind benchmark of `thsa-cosim diagnose`: units of a plant that shares nothing with the Modelica model.
 
-    python benchmarks/blind.py -o DIR [--units N] [--seed 1] [--jobs 2]
+    python benchmarks/blind.py -o DIR [--units N] [--seed 1] [--jobs 2] [--docs]
 
 Makes the units (each effect of the contract at three strengths, pairs, effects that no catalogue has, clean units),
 diagnoses each as a user would, and prints what was reached of every goal, with a binomial interval, and the
 confusion matrix. `--units N` takes a balanced part: any N units hold all kinds and effects in proportion. What has
-been run is kept: the same command goes on where it was stopped, and a larger N adds to what is there.
+been run is kept: the same command goes on where it was stopped, and a larger N adds to what is there. `--docs` writes
+what was reached as docs/blind.md, with the seed and the commits that the units were run on.
 
     DIR/recordings/u0001/{fit,validate}_{1,2}.parquet   all that the diagnosis sees
     DIR/labels/u0001.json                               the truth
     DIR/studies/u0001/result.json, u0001.json, u0001.log   the study; how long it took; what it printed
+    DIR/plan.json, summary.txt            seed and commits; what was reached
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
+import resource
 import shlex
 import subprocess
 import sys
@@ -29,12 +32,14 @@ from pathlib import Path
 
 import numpy as np
 from blind_effects import CATALOGUE
+from blind_goals import docs_page, summary
 from blind_outside import OUTSIDE
 from blind_schedules import PARTS
-from blind_score import read_score, summary
+from blind_score import read_score
 from blind_units import STRENGTHS, generate_unit
 
 ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs" / "blind.md"
 OURS = Path(sys.executable).with_name("thsa-cosim")
 SEEDS = 3  # units of each effect and strength
 CLEAN, PAIRS = 60, 36
@@ -101,6 +106,7 @@ def _pairs(random: np.random.Generator) -> list[tuple[tuple[str, ...], str]]:
 def run(unit: Unit, folder: Path, command: list[str], scenario: Path, deadline: float) -> Unit:
     """Make the unit's recordings and diagnose them, each only where that has not been done."""
     label, data = folder / "labels" / f"{unit.name}.json", folder / "recordings" / unit.name
+    begin, spent = time.monotonic(), _processor()
     if not label.exists():
         truth = generate_unit(data, unit.effects, unit.strength, unit.seed)
         label.write_text(json.dumps({"kind": unit.kind, **truth}, indent=1))
@@ -108,7 +114,7 @@ def run(unit: Unit, folder: Path, command: list[str], scenario: Path, deadline: 
     if done.exists():
         return unit
     files = [word for part in PARTS for word in (f"--{part.split('_')[0]}", str(data / f"{part}.parquet"))]
-    begin = time.monotonic()
+    made = time.monotonic()
     with study.with_suffix(".log").open("w") as log:
         try:
             ended = subprocess.run(
@@ -122,8 +128,43 @@ def run(unit: Unit, folder: Path, command: list[str], scenario: Path, deadline: 
             code: int | None = ended.returncode
         except subprocess.TimeoutExpired:
             code = None
-    done.write_text(json.dumps({"exit_code": code, "seconds": round(time.monotonic() - begin, 1)}))
+    took = {
+        "exit_code": code,
+        "seconds": round(time.monotonic() - made, 1),
+        "plant_seconds": round(made - begin, 1),
+        "cpu_seconds": round(_processor() - spent, 1),
+    }
+    done.write_text(json.dumps(took))
     return unit
+
+
+def _processor() -> float:
+    """Processor time in s of this process and of its children that have ended."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(u.ru_utime + u.ru_stime for u in used)
+
+
+def note_plan(folder: Path, seed: int, runs: bool) -> list[str]:
+    """Write the seed, and the commit that units are run on (``runs``) beside those before; return these commits.
+
+    ValueError if the folder was begun with another seed.
+    """
+    file = folder / "plan.json"
+    known = json.loads(file.read_text()) if file.exists() else {"seed": seed}
+    if known["seed"] != seed:
+        raise ValueError(f"{folder} was begun with --seed {known['seed']}")
+    commits = dict.fromkeys(known.get("commits", []))
+    if runs:
+        commits[_commit()] = None
+    file.write_text(json.dumps({"seed": seed, "commits": list(commits)}))
+    return list(commits)
+
+
+def _commit() -> str:
+    """The commit of this checkout, with ``-dirty`` where its code was changed since."""
+    command = ["git", "describe", "--always", "--dirty", "--exclude", "*"]
+    found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return found.stdout.strip() or "unknown"
 
 
 def main() -> None:
@@ -137,17 +178,22 @@ def main() -> None:
     parser.add_argument("--deadline", type=float, default=1200.0, help="s, for one diagnosis")
     parser.add_argument("--scenario", type=Path, default=ROOT / "scenarios" / "driven.toml")
     parser.add_argument("--command", help="what diagnoses (thsa-cosim diagnose)")
+    parser.add_argument(
+        "--docs", nargs="?", type=Path, const=DOCS, help="write what was reached as a page (docs/blind.md)"
+    )
     options = parser.parse_args()
 
     folder = options.output.resolve()
     for part in ("labels", "recordings", "studies"):
         (folder / part).mkdir(parents=True, exist_ok=True)
-    wrote = folder / "plan.json"
-    if wrote.exists() and json.loads(wrote.read_text())["seed"] != options.seed:
-        parser.error(f"{folder} was begun with --seed {json.loads(wrote.read_text())['seed']}")
-    wrote.write_text(json.dumps({"seed": options.seed}))
     command = shlex.split(options.command) if options.command else [str(OURS), "diagnose"]
-    units = plan(options.seed)[: options.units]
+    whole = plan(options.seed)
+    units = whole[: options.units]
+    try:
+        runs = any(not (folder / "studies" / f"{u.name}.json").exists() for u in units)
+        commits = note_plan(folder, options.seed, runs)
+    except ValueError as wrong:
+        parser.error(str(wrong))
     scores = []
     with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
         waiting = [
@@ -163,8 +209,12 @@ def main() -> None:
                 flush=True,
             )
     scores.sort(key=lambda found: found.unit)
-    (folder / "summary.txt").write_text(text := summary(scores) + "\n")
+    text = summary(scores, len(whole))
+    (folder / "summary.txt").write_text(text + "\n")
     print(text)
+    if options.docs:
+        page = docs_page(text, seed=options.seed, commits=commits, count=len(units), whole=len(whole))
+        options.docs.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

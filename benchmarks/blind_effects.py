@@ -299,7 +299,7 @@ def inverter_dead_time(random: Random, rig: Rig) -> Draft:
         "with a sixth harmonic" if sixth else "soft sign",
         lambda a: {"dead_voltage": 1.5 * a, "dead_current": current, "dead_sixth": sixth},
         10.0,
-        _one("dead_voltage", "V", "voltage", "drop", "dead"),
+        _one("dead_voltage", "V", "voltage", "drop", "dead", "u_d"),
     )
 
 

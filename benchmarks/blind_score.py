@@ -1,4 +1,4 @@
-"""Scores of the blind benchmark: a unit's label against its result.json, and what all of them reach.
+"""Scores of the blind benchmark: a unit's label against its result.json. What all reach of the goals: `blind_goals`.
 
 Names count as in the contract: what follows a colon is a location, `equivalent` names of the first effect are a
 tie that these data allow, and more than two of them are no answer. A place is right if it is named, or in the tie.
@@ -9,15 +9,13 @@ floor is the sensors' own.
 from __future__ import annotations
 
 import json
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 from pathlib import Path
 from typing import Any
 
-from blind_units import EFFECTS, FLOOR
-from scipy.stats import binomtest
+from blind_units import FLOOR
 
 from thsa_cosim.errors import ThsaCosimError
 from thsa_cosim.units import convert
@@ -63,6 +61,7 @@ class Score:
         bool, ...
     ]  # of the effects rightly named that can be at several places: named there, or tied
     seconds: float | None
+    cpu: float | None = None  # s, the plant's included
 
     @property
     def quiet(self) -> bool:
@@ -74,9 +73,13 @@ class Score:
 
 
 def score(
-    unit: str, label: Mapping[str, Any], result: Mapping[str, Any] | None, seconds: float | None
+    unit: str,
+    label: Mapping[str, Any],
+    result: Mapping[str, Any] | None,
+    seconds: float | None,
+    cpu: float | None = None,
 ) -> Score:
-    """`label` as blind.py writes it; `result` is None where the diagnosis failed."""
+    """`label` as blind.py writes it; `result` is None where the diagnosis failed; times in s."""
     truth = tuple(effect["name"] for effect in label["effects"])
     reported = [_reported(entry) for entry in (result or {}).get("effects", [])]
     verdict = FAILED if result is None else str(result["verdict"])
@@ -121,6 +124,7 @@ def score(
             if (place := place_of(effect)) and pairing[effect["name"]].place
         ),
         seconds=seconds,
+        cpu=cpu,
     )
 
 
@@ -209,85 +213,10 @@ def _converted(value: float, entry: Mapping[str, Any], unit: str) -> float | Non
         return None
 
 
-# -- all units together -------------------------------------------------------------------------------------
-def summary(scores: Sequence[Score]) -> str:
-    """The goals of the benchmark and what was reached, the confusion matrix, and every unit that went wrong."""
-    by_kind = {kind: [s for s in scores if s.kind == kind] for kind in ("single", "pair", "outside", "clean")}
-    named = by_kind["single"] + by_kind["pair"] + by_kind["clean"]
-    measured = [s.held_out for s in named if s.held_out is not None]
-    lines = [
-        f"{len(scores)} units: " + ", ".join(f"{len(found)} {kind}" for kind, found in by_kind.items()),
-        "",
-        "goal                                            reached          95 % interval",
-        _goal("right class first", ">= 95 %", by_kind["single"], lambda s: s.right),
-        _goal("  ... and no other named", "", by_kind["single"], lambda s: s.alone),
-        _goal("right place, or a tie that holds it", ">= 95 %", [p for s in scores for p in s.placed], bool),
-        _goal("false alarms on clean units", "<= 2 %", by_kind["clean"], lambda s: not s.quiet),
-        _goal("  ... that name an effect", "", by_kind["clean"], lambda s: bool(s.names)),
-        _goal("outside effects flagged", ">= 90 %", by_kind["outside"], lambda s: s.flagged),
-        _goal("both of two", ">= 90 %", by_kind["pair"], lambda s: s.right),
-        _goal("  ... and no third named", "", by_kind["pair"], lambda s: s.alone),
-        _goal(f"held-out error <= {HELD_OUT} x floor", "all", measured, lambda ratio: ratio <= HELD_OUT),
-        _goal("coefficient in its interval", ">= 90 %", [c for s in scores for c in s.covered], bool),
-    ]
-    seconds = sorted(s.seconds for s in scores if s.seconds is not None)
-    if seconds:
-        lines.append(
-            f"time of a unit: median {seconds[len(seconds) // 2]:.0f} s, longest {seconds[-1]:.0f} s"
-        )
-    lines += ["", "right class first, by strength"]
-    for strength in ("weak", "medium", "strong"):
-        lines.append(
-            _goal(
-                f"  {strength}",
-                "",
-                [s for s in by_kind["single"] if s.strength == strength],
-                lambda s: s.right,
-            )
-        )
-    lines += ["", *_confusion(scores), "", "units that went wrong"]
-    lines += [
-        f"  {s.unit} {s.strength:6s} {' + '.join(s.truth) or 'clean'} ({'; '.join(s.forms)}) -> "
-        f"{s.verdict} {', '.join(s.names)}"
-        for s in scores
-        if not s.right
-    ]
-    return "\n".join(lines)
-
-
-def _goal(text: str, goal: str, cases: Sequence[Any], holds: Callable[[Any], bool]) -> str:
-    if not cases:
-        return f"{text:36s} {goal:8s}    no case"
-    count = sum(map(holds, cases))
-    interval = binomtest(count, len(cases)).proportion_ci(method="exact")
-    share, low, high = (100.0 * value for value in (count / len(cases), interval.low, interval.high))
-    return f"{text:36s} {goal:8s} {count:4d} of {len(cases):4d} {share:5.1f} %   {low:5.1f} .. {high:5.1f} %"
-
-
-def _confusion(scores: Sequence[Score]) -> list[str]:
-    """Rows: truth (pairs left out). Columns: what was named first, a tie with the truth counted as the truth."""
-    table: dict[str, Counter[str]] = defaultdict(Counter)
-    for s in scores:
-        if s.kind != "pair":
-            table[s.truth[0] if s.truth else "clean"][s.first] += 1
-    rows = [name for name in [*EFFECTS, "clean"] if name in table]
-    met = {first for row in table.values() for first in row}
-    known = [name for name in [*EFFECTS, NONE, UNEXPLAINED, FAILED] if name in met]
-    columns = known + sorted(met - set(known))
-    letters = [chr(ord("A") + j) for j in range(len(columns))]
-    lines = [
-        "confusion: truth by what was named first",
-        " " * 28 + "".join(f"{letter:>4s}" for letter in letters),
-    ]
-    for name in rows:
-        counts = (table[name][column] for column in columns)
-        lines.append(f"{name:28s}" + "".join(f"{count or '.':>4}" for count in counts))
-    return lines + [f"  {letter} {column}" for letter, column in zip(letters, columns, strict=True)]
-
-
 def read_score(unit: str, label: Path, study: Path) -> Score:
     """The score of a unit whose diagnosis has ended."""
     found = study / "result.json"
     run = json.loads((study.parent / f"{unit}.json").read_text())
     result = json.loads(found.read_text()) if found.exists() and run["exit_code"] == 0 else None
-    return score(unit, json.loads(label.read_text()), result, run["seconds"])
+    spent = run["seconds"] + run.get("plant_seconds", 0.0)
+    return score(unit, json.loads(label.read_text()), result, spent, run.get("cpu_seconds"))

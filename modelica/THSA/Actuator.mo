@@ -23,7 +23,7 @@ model Actuator "THSA in closed velocity loop, every loss a law over temperature"
   THSA.Nut nut(F_f=screwEffect.F) "Nut";
   THSA.Stabilizer stabilizer "Stabilizer";
   THSA.VelocitySensor sensor "Velocity sensor";
-  replaceable THSA.Effects.IdealInverter inverterEffect constrainedby THSA.Interfaces.VoltageEffect
+  replaceable THSA.Effects.IdealInverter inverterEffect constrainedby THSA.Interfaces.VoltageEffect(phi=motor.phi)
     "Slot: voltage of the inverter";
   replaceable THSA.Effects.NoHeating windingEffect constrainedby THSA.Interfaces.HeatingEffect
     "Slot: heating of winding and magnets";

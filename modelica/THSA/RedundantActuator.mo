@@ -40,7 +40,7 @@ model RedundantActuator "THSA with two motor lanes, active and standby, and two 
   THSA.VelocitySensor sensor "Velocity sensor";
   replaceable THSA.Thermal.GivenTemperatures temperatures constrainedby THSA.Interfaces.PartTemperatures
     "Slot: temperatures of the parts";
-  replaceable THSA.Effects.IdealInverter inverterAEffect constrainedby THSA.Interfaces.VoltageEffect
+  replaceable THSA.Effects.IdealInverter inverterAEffect constrainedby THSA.Interfaces.VoltageEffect(phi=laneA.motor.phi)
     "Slot: voltage of the inverter of lane A";
   replaceable THSA.Effects.NoHeating windingAEffect constrainedby THSA.Interfaces.HeatingEffect
     "Slot: heating of winding and magnets of motor A";
@@ -50,7 +50,7 @@ model RedundantActuator "THSA with two motor lanes, active and standby, and two 
     "Slot: friction and torques at motor A and its brake";
   replaceable THSA.Effects.IdealSensor currentSensorAEffect(u(unit="A"), d(unit="A")) constrainedby THSA.Interfaces.SensorEffect
     "Slot: sensor of the current of lane A [A], which its loop uses";
-  replaceable THSA.Effects.IdealInverter inverterBEffect constrainedby THSA.Interfaces.VoltageEffect
+  replaceable THSA.Effects.IdealInverter inverterBEffect constrainedby THSA.Interfaces.VoltageEffect(phi=laneB.motor.phi)
     "Slot: voltage of the inverter of lane B";
   replaceable THSA.Effects.NoHeating windingBEffect constrainedby THSA.Interfaces.HeatingEffect
     "Slot: heating of winding and magnets of motor B";

@@ -10,10 +10,11 @@ import pytest
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 sys.path.append(str(BENCHMARKS))
-from blind import PAIRS, Unit, plan, run
+from blind import PAIRS, Unit, note_plan, plan, run
 from blind_effects import CATALOGUE
+from blind_goals import Goal, docs_page, summary
 from blind_outside import OUTSIDE
-from blind_score import FLOOR, Score, score, summary
+from blind_score import FLOOR, Score, score
 
 
 def label(kind: str, *names: str, coefficients: tuple[dict, ...] = ()) -> dict:
@@ -161,18 +162,87 @@ def test_summary_counts_each_goal_on_its_own_units() -> None:
         judged("outside", ("spring",), result(STRUCTURE)),
         judged("pair", ("windage", "cogging"), result(MISSING, effect("cogging"), effect("windage"))),
     ]
-    text = summary(scores)
-    reached = {line[:36].strip(): line[45:].split()[:3] for line in text.splitlines() if " of " in line}
+    text = summary(scores, 321)
+    reached = {line[:36].strip(): line[46:].split()[:3] for line in text.splitlines() if " of " in line}
     assert reached["right class first"] == ["1", "of", "3"]
     assert reached["false alarms on clean units"] == ["1", "of", "1"]
     assert reached["outside effects flagged"] == ["1", "of", "1"]
     assert reached["both of two"] == ["1", "of", "1"]
-    assert reached["held-out error <= 1.1 x floor"] == ["3", "of", "4"]
+    assert reached["held-out error <= 1.1 x floor"] == ["3", "of", "5"]  # without a result it is not reached
     rows = {line[:28].strip(): line[28:].split() for line in text.splitlines() if line[:1].isalpha()}
     assert rows["cogging"] == [".", ".", ".", "1"]  # named cogging, windage, structure, nothing
     assert rows["windage"] == ["1", "1", ".", "."]
     assert rows["spring"] == [".", ".", "1", "."]
     assert rows["clean"] == ["1", ".", ".", "."]
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "wanted", "hold", "verdict"),
+    [
+        (0.97, 1.0, ">= 97 %", 97, "met"),
+        (0.97, 1.0, ">= 97 %", 96, "missed"),
+        (0.0, 0.02, "<= 2 %", 2, "met"),
+        (0.0, 0.02, "<= 2 %", 3, "missed"),
+        (0.92, 0.98, "92..98 %", 91, "missed"),
+        (0.92, 0.98, "92..98 %", 98, "met"),
+        (0.92, 0.98, "92..98 %", 99, "missed"),
+        (None, 1.0, "", 50, ""),
+    ],
+)
+def test_a_goal_is_met_by_the_share_itself(least, most, wanted: str, hold: int, verdict: str) -> None:
+    goal = Goal("something", [True] * hold + [False] * (100 - hold), least=least, most=most)
+    assert (goal.wanted, goal.verdict) == (wanted, verdict)
+    assert str(goal).endswith(verdict)
+    assert Goal("something", [], least=least, most=most).verdict == ""
+
+
+def test_every_goal_of_the_benchmark_has_its_limit_and_a_verdict() -> None:
+    window = effect("windage", c=(2e-6, "N.m.s2/rad2", 1e-8))
+    true = {"value": 2e-6, "unit": "N.m.s2/rad2", "words": ()}
+    placed_right = placed("stribeck_motor", 6.0, "rad/s", effect("stribeck:motor", v_S=(6.0, "rad/s", 0.1)))
+    scores = [
+        placed_right,
+        judged("single", ("windage",), result(MISSING, window), coefficients=(true,)),
+        judged("clean", (), result(NOTHING)),
+        judged("outside", ("spring",), result(STRUCTURE)),
+        judged("pair", ("windage", "cogging"), result(MISSING, effect("cogging"), effect("windage"))),
+    ]
+    rows = {line[:36].strip(): line for line in summary(scores, 321).splitlines()}
+    wanted = {
+        "right class first": ">= 97 %",
+        "right place, or a tie that holds it": ">= 95 %",
+        "false alarms on clean units": "<= 2 %",
+        "outside effects flagged": ">= 95 %",
+        "both of two": ">= 90 %",
+        "held-out error <= 1.1 x floor": ">= 95 %",
+        "coefficient in its 95 % interval": "92..98 %",
+        "time on 2 cores": "<= 60 min",
+    }
+    for text, limit in wanted.items():
+        assert limit in rows[text]
+        assert rows[text].split()[-1] in ("met", "missed")
+
+
+@pytest.mark.parametrize(("whole", "verdict", "minutes"), [(720, "met", "60.0"), (721, "missed", "60.1")])
+def test_time_of_the_whole_benchmark_is_in_proportion(whole: int, verdict: str, minutes: str) -> None:
+    """Units of 10 s each, two at a time."""
+    text = summary([judged("clean", (), result(NOTHING))] * 3, whole)
+    row = next(line for line in text.splitlines() if line.startswith("time on 2 cores"))
+    assert row.split()[-1] == verdict
+    assert f"{minutes} min" in row
+    assert f"from 3 to {whole} units" in row
+
+
+def test_the_commits_of_a_run_are_kept_beside_its_seed(tmp_path: Path) -> None:
+    (tmp_path / "plan.json").write_text(json.dumps({"seed": 7, "commits": ["abc1234"]}))
+    assert note_plan(tmp_path, 7, runs=False) == ["abc1234"]
+    both = note_plan(tmp_path, 7, runs=True)
+    assert both[0] == "abc1234"
+    assert note_plan(tmp_path, 7, runs=True) == both  # the same one once
+    with pytest.raises(ValueError, match="--seed 7"):
+        note_plan(tmp_path, 8, runs=False)
+    page = docs_page("all of it", seed=7, commits=both, count=60, whole=321)
+    assert all(word in page for word in ("--seed 7", "--units 60", "abc1234", "321", "all of it"))
 
 
 def test_plan_holds_what_the_issue_asks_for_and_every_beginning_is_balanced() -> None:
@@ -208,7 +278,9 @@ def test_a_unit_is_made_and_diagnosed_once(tmp_path: Path) -> None:
         (tmp_path / part).mkdir()
     for _ in range(2):  # the second study.mkdir() would fail
         run(unit, tmp_path, [sys.executable, str(fake)], Path("driven.toml"), 60.0)
-    assert json.loads((tmp_path / "studies" / "u0007.json").read_text())["exit_code"] == 0
+    took = json.loads((tmp_path / "studies" / "u0007.json").read_text())
+    assert took["exit_code"] == 0
+    assert took["cpu_seconds"] > 0.0
     assert (tmp_path / "studies" / "u0007" / "result.json").exists()
     assert json.loads((tmp_path / "labels" / "u0007.json").read_text())["kind"] == "clean"
     assert len(list((tmp_path / "recordings" / "u0007").iterdir())) == 4
@@ -232,7 +304,18 @@ def test_command_scores_what_has_been_run(tmp_path: Path) -> None:
             answer = result(MISSING, effect("no-such-effect"))
         (tmp_path / "studies" / name / "result.json").write_text(json.dumps(answer))
     ended = subprocess.run(
-        [sys.executable, str(BENCHMARKS / "blind.py"), "-o", str(tmp_path), "--jobs", "1", "--units", "3"],
+        [
+            sys.executable,
+            str(BENCHMARKS / "blind.py"),
+            "-o",
+            str(tmp_path),
+            "--jobs",
+            "1",
+            "--units",
+            "3",
+            "--docs",
+            str(tmp_path / "page.md"),
+        ],
         capture_output=True,
         text=True,
         timeout=120,
@@ -241,4 +324,5 @@ def test_command_scores_what_has_been_run(tmp_path: Path) -> None:
     marks = {line.split()[1]: line.split()[2] for line in ended.stdout.splitlines()[:3]}
     assert marks == {"u0001": "ok", "u0002": "NO", "u0003": "NO"}
     assert "no result" in ended.stdout
-    assert (tmp_path / "summary.txt").read_text() in ended.stdout
+    assert (text := (tmp_path / "summary.txt").read_text()) in ended.stdout
+    assert text in (tmp_path / "page.md").read_text()

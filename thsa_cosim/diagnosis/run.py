@@ -100,13 +100,15 @@ def _diagnose(
         scenario.simulation,
         study.open_runner,
     )
-    with study.open_runner(scenario.simulation, [t.experiment for t in driven]) as runner:
+    watched = () if isinstance(tested, BlackBox) else tested.watched
+    with study.open_runner(scenario.simulation, [*(t.experiment for t in driven), *watched]) as runner:
+        signals_at = tested.signals_at if isinstance(tested, BlackBox) else partial(tested.signals_at, runner)
         given = {variable: value for effect in known for variable, value in effect.given.items()}
         bench = Bench(runner, driven, {**held_shapes(tested.candidates), **given})
         start = before.fit.vector
         at_start = {t.case.name: unknowns.assignments(start, t.group) for t in driven if t.part == "fit"}
-        machine = machine_of(tested.slots, tested.signals_at(at_start))
-        scan = wave_number_finder(bench, tested.slots, tested.signals_at, machine)
+        machine = machine_of(tested.slots, signals_at(at_start))
+        scan = wave_number_finder(bench, tested.slots, signals_at, machine)
         found = attribute(
             bench,
             unknowns,

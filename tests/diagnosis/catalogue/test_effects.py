@@ -140,6 +140,16 @@ def test_dead_time_costs_its_voltage(superset: Plant):
     assert after["i_q"] == pytest.approx(before["i_q"], rel=1e-6)
 
 
+def test_dead_time_ripples_with_the_rotor_against_the_current(superset: Plant):
+    block, amplitude, n = "inverterEffect.inverterDeadTime", (0.2, -0.3), 24.0
+    values = {"U_d": 1.5, "i_r": 0.1, "u_s": amplitude[0], "u_c": amplitude[1], "n": n}
+    found = run(superset, {f"{block}.{k}": x for k, x in values.items()}, ("inverterEffect.du", "motor.phi"))
+    ripple = amplitude[0] * np.sin(n * found["motor.phi"]) + amplitude[1] * np.cos(n * found["motor.phi"])
+    expected = -(1.5 + ripple) * np.clip(found["i_q"] / 0.1, -1.0, 1.0)
+    assert np.ptp(found["motor.phi"]) > 2.0 * np.pi / n
+    np.testing.assert_allclose(found["inverterEffect.du"], expected, atol=1e-9)
+
+
 def test_self_heating_settles_where_loss_and_cooling_balance(superset: Plant):
     h, tau, alpha_R, alpha_psi = 30.0, 0.05, 3.93e-3, -1.2e-3
     block = "windingEffect.windingSelfHeating"

@@ -183,3 +183,12 @@ def test_a_parameter_that_is_zero_is_told_of_where_nothing_else_moves_only() -> 
     assert "T_c would be 0.05 in place of 0 N.m" in note
     (note,) = notes_on_hidden([part({"K_t": 0.02, "T_c": 0.05})], fit, errors)
     assert "K_t would be 0.327 in place of 0.307 N.m/A" in note
+
+
+def test_three_parameters_are_listed() -> None:
+    fit = fitted(SPREAD)
+    third = replace(fit.unknowns.members[1], name="T_d", variable="T_d")
+    wider = replace(fit, unknowns=fit.unknowns.with_members([third]), vector=np.array([0.307, 0.1, 0.1]))
+    moves = {"K_t": 0.1, "T_c": 0.05, "T_d": 0.01}
+    (note,) = notes_on_hidden([part(moves)], wider, np.full(3, 1e-3))
+    assert "a change of K_t, T_c and T_d does" in note

@@ -414,3 +414,15 @@ def test_another_shaft_whose_fit_did_not_find_its_way_starts_from_the_winner_to_
         room, "polish", lambda bench, one, current, held: scored("a", 0.0, "gear") if one is lost else one
     )
     assert names(selection.rivals(winner, [winner, lost, foreign], ())) == ["a:gear"]
+    assert names(selection.rivals(winner, [foreign, winner, lost], ())) == ["a:gear"], "in whatever order"
+
+
+def test_effects_of_larger_sizes_join_what_was_refined_where_that_leads_astray(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    refined, larger = [scored("a", 0.3), scored("b", 0.4)], scored("c", 0.1)
+    monkeypatch.setattr(room, "at_sizes", lambda *given: [larger] if given[-1] == ["offered"] else [])
+    for astray, expected in ((True, ["c:motor", "a:motor", "b:motor"]), (False, ["a:motor", "b:motor"])):
+        monkeypatch.setattr(room, "is_led_astray", lambda current, found, astray=astray: astray)
+        offered: Any = ["offered"]
+        assert names(tuple(selection.at_sizes(refined, offered))) == expected

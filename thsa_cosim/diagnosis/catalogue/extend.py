@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
-from thsa_cosim.diagnosis.catalogue.slots import INPUTS, OUTPUTS, Slot
+from thsa_cosim.diagnosis.catalogue.slots import INPUTS, OPTIONAL, OUTPUTS, Slot
 from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export import export_fmu
 from thsa_cosim.export.compile import native_platform
@@ -61,10 +61,11 @@ def _block(slot: Slot, candidates: Sequence[Candidate], values: Mapping[str, flo
     lines.append(f"    extends THSA.Interfaces.{slot.interface};")
     for component, member in members.items():
         own = {p.name: p for c in candidates if c.component == component for p in c.all_parameters}
-        modifiers = ", ".join(
+        modifiers = [
             f'{p.name}(unit="{p.unit}") = {values.get(p.variable, p.at_start)!r}' for p in own.values()
-        )
-        lines.append(f"    {member.qualified_block} {component}({modifiers});")
+        ]
+        modifiers += [f"{v} = {v}" for v in OPTIONAL.get(slot.interface, ())]
+        lines.append(f"    {member.qualified_block} {component}({', '.join(modifiers)});")
     lines.append("  equation")
     for component in members:
         lines += [f"    {component}.{v} = {v};" for v in INPUTS[slot.interface]]

@@ -23,6 +23,8 @@ INPUTS: Mapping[str, tuple[str, ...]] = {
     "SensorEffect": ("u",),
     "PhaseEffect": ("i_q", "phi"),
 }
+#: Further inputs that a model need not give, since they have a default: passed on as modifiers, not as equations.
+OPTIONAL: Mapping[str, tuple[str, ...]] = {"VoltageEffect": ("phi",)}
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "FrictionEffect": ("F",),
     "ShaftEffect": ("tau",),

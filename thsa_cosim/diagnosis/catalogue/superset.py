@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from thsa_cosim.batch import Experiment, Job, Status
+from thsa_cosim.batch import Experiment, Job, Runner, Status
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate, candidates_of
 from thsa_cosim.diagnosis.catalogue.effect import Effect
 from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, source_beside, write_extended
@@ -27,13 +27,15 @@ from thsa_cosim.study import Case, export_digest, is_made_from, note_made_from
 class Superset:
     """The FMU with all effects, its slots, and the candidates with the scales of this drive.
 
-    ``signals_at``: start values by case → the inputs of every slot with a position, by case.
+    ``signals_at``: a runner of ``watched`` and start values by case → the inputs of every slot with a position, by
+    case.
     """
 
     fmu: Path
     slots: tuple[Slot, ...]
     candidates: tuple[Candidate, ...]
-    signals_at: Callable[[Mapping[str, Mapping[str, float]]], Mapping[str, Signals]]
+    watched: tuple[Experiment, ...]
+    signals_at: Callable[[Runner, Mapping[str, Mapping[str, float]]], Mapping[str, Signals]]
 
 
 def open_superset(
@@ -52,7 +54,8 @@ def open_superset(
     fmu, slots, chosen = build_superset(model, scenario.diagnose.package, effects, folder)
     own = [replace(case, fmu=fmu) for case in cases]
     candidates = candidates_of(chosen, slots, scales_of(fmu, slots, own, open_))
-    return Superset(fmu, slots, candidates, lambda values: slot_signals(slots, own, values, open_))
+    watched = slot_experiments(slots, own)
+    return Superset(fmu, slots, candidates, watched, lambda runner, values: run_slots(runner, own, values))
 
 
 def build_superset(
@@ -133,6 +136,10 @@ class SizesReducer:
         return np.array(found, dtype=np.float64).ravel()
 
 
+def _slots_of(case: Case) -> str:
+    return f"slots/{case.name}"
+
+
 def _with_outputs(case: Case, outputs: tuple[str, ...]) -> Experiment:
     return replace(case.experiment(case.name, None), outputs=outputs)
 
@@ -143,10 +150,13 @@ def slot_signals(
     values: Mapping[str, Mapping[str, float]],
     open_: Opening,
 ) -> dict[str, Signals]:
-    """What effects read in every slot with a position, by case name, at the given start values per case.
+    """What effects read in every slot with a position, by case name, at the given start values per case."""
+    with open_(slot_experiments(slots, cases)) as runner:
+        return run_slots(runner, cases, values)
 
-    The position, and of a friction slot the speed and the load.
-    """
+
+def slot_experiments(slots: Sequence[Slot], cases: Sequence[Case]) -> tuple[Experiment, ...]:
+    """What ``run_slots`` runs: the cases with the position in every slot, and of a friction slot speed and load."""
     friction = (s for s in slots if s.interface == "FrictionEffect")
     outputs = tuple(
         dict.fromkeys(
@@ -156,7 +166,12 @@ def slot_signals(
             ]
         )
     )
-    experiments = [_with_outputs(case, outputs) for case in cases]
-    with open_(experiments) as runner:
-        outcomes = runner.run([Job(c.name, values[c.name]) for c in cases])
+    return tuple(replace(_with_outputs(case, outputs), name=_slots_of(case)) for case in cases)
+
+
+def run_slots(
+    runner: Runner, cases: Sequence[Case], values: Mapping[str, Mapping[str, float]]
+) -> dict[str, Signals]:
+    """The signals of `slot_experiments`, by case name, at the given start values per case."""
+    outcomes = runner.run([Job(_slots_of(c), values[c.name]) for c in cases])
     return {c.name: o.signals for c, o in zip(cases, outcomes, strict=True) if o.signals is not None}

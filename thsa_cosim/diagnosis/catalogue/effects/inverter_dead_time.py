@@ -11,10 +11,13 @@ def voltage(p: Values, at: Connectors) -> FloatArray:
     return -p["U_d"] * np.clip(at["i_q"] / p["i_r"], -1.0, 1.0)
 
 
+#: Numbers of pole pairs whose ripple is looked for.
+PAIRS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12)
+
 EFFECT = Effect(
     name="inverter-dead-time",
     title="Voltage that the inverter's dead time takes",
-    physics="u = u_q - U_d sgn(i_q)",
+    physics="u = u_q - (U_d + u_6 sin(n phi + phase)) sgn(i_q), n six times the pole pairs",
     source="Jeong and Park, IEEE Trans. Ind. Electron. 38 (1991) 108",
     signature="voltage beyond R i and back-EMF that follows the current's sign and not its size",
     variants=(
@@ -35,6 +38,25 @@ EFFECT = Effect(
                 ),
             ),
             law=voltage,
+        ),
+        Variant(
+            interface="VoltageEffect",
+            block="InverterDeadTime",
+            parameters=(
+                EffectParameter("u_s", "U", 0.1, "amplitude of its ripple, sine part"),
+                EffectParameter("u_c", "U", 0.1, "amplitude of its ripple, cosine part"),
+                EffectParameter(
+                    "n",
+                    "1",
+                    6.0,
+                    "periods of the ripple per revolution",
+                    role="shape",
+                    lower=3.0,
+                    upper=144.0,
+                    starts=tuple(6.0 * pairs for pairs in PAIRS),
+                ),
+            ),
+            beside=True,
         ),
     ),
 )

@@ -205,7 +205,7 @@ class Conclusion:
         self.study.place.say("looking for an empirical law")
         return LawSearch(
             self.scenario, self.spec, self.trials, self.unknowns, self.known, self.found.accepted, after,
-            self.study.folder / WORK, self.study.open_runner, self.machine,
+            self.study.folder / WORK, self.study.open_runner, self.machine, self.study.place.say,
         ).find()  # fmt: skip
 
     def _with_law(self, terms: Attribution) -> _Model:

@@ -53,6 +53,15 @@ def test_one_candidate_gains_chi_square_by_chance(coefficients: int):
     assert stats.kstest(gains, stats.chi2(coefficients).cdf).pvalue > 1e-3
 
 
+def test_two_coefficients_that_do_the_same_gain_as_one_does():
+    fit = base()
+    one, other = proposal(fit, 1).response, proposal(fit, 1).response
+    response = np.concatenate([one, one + 3e-4 * other], axis=1)
+    alike = SimpleNamespace(response=response, is_testable=True)
+    gains = largest_gains(fit, [alike], seed=4, draws=2000)  # type: ignore[list-item]
+    assert stats.kstest(gains, stats.chi2(1).cdf).pvalue > 1e-3
+
+
 def test_the_best_of_many_candidates_gains_more_and_the_threshold_covers_it():
     fit = base()
     many = [proposal(fit, 1) for _ in range(30)]

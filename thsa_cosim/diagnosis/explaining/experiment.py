@@ -262,9 +262,8 @@ class _Plan:
             return share
         samples = ran.inputs.time.size
         seen = max(VISIBLE**2 * samples, SIGNIFICANT * samples**0.5)
-        return min(
-            share, max(SIGMAS**2, seen * sum(self._factor(c.name) ** 2 for c in self.fit[0].case.channels))
-        )
+        level = sum(self._factor(c.name) ** 2 for c in self.fit[0].case.channels)
+        return min(share, max(SIGMAS**2, float(seen * level)))
 
     def _alone_is_noise(self) -> bool:
         """Whether nothing is to be seen of what the accepted effect leaves in the fit recordings."""

@@ -236,7 +236,10 @@ class Bench:
             outcome = self._try()
             done = f"{np.ptp(self._time):.3g} s of {np.ptp(whole):g} s"
             return outcome, f"; only {done}: all of it takes more than {self._deadline:g} s (see --deadline)"
-        return killed, ""
+        if outcome.ok or outcome.status is Status.TIMEOUT:
+            return killed, ""
+        tried = f"over {np.ptp(self._time):g} s, with inputs that move faster, it fails ({outcome.reason})"
+        return replace(killed, reason=f"{killed.reason}; {tried}: see --deadline, --duration and --input"), ""
 
     def _is_slow_later(self, killed: Outcome, whole: FloatArray) -> bool:
         """Whether a run that was killed had got there slowly; else it was quick and hangs there."""

@@ -27,6 +27,9 @@ LARGE = 0.5
 LARGE_SHARE = 0.01
 """The same over the range of a signal that no sensor has measured, as in a check."""
 
+_STANDARD_ERRORS = 3.0
+"""A shift of a value, in its standard errors, that is worth a word."""
+
 
 @dataclass(frozen=True)
 class CouplingError:
@@ -43,6 +46,8 @@ class CouplingError:
     remedy: str = "lower the steps of the components"
     ranges: Mapping[str, float] = field(default_factory=dict)
     """Of the signals, in the same: what counts where there is no noise, as in a tuning."""
+    samples: int = 0
+    """Compared; a change that looks like that of one parameter moves it by sqrt(samples) times change over noise."""
 
     @property
     def has_noise(self) -> bool:
@@ -67,7 +72,11 @@ class CouplingError:
             )
         over = f"{ratio:.2g} times its noise" if self.has_noise else f"{100.0 * ratio:.2g} % of its range"
         size = f"{self.changes[name]:.2g} {self.units[name]} rms, {over}"
-        return f"halving the communication steps changes {name} by {size} ({self.recording})"
+        said = f"halving the communication steps changes {name} by {size} ({self.recording})"
+        at_worst = ratio * float(np.sqrt(self.samples)) if self.has_noise else 0.0
+        if at_worst > _STANDARD_ERRORS:
+            said += f", which may move a value by up to {at_worst:.2g} of its standard errors"
+        return said
 
     @property
     def reason(self) -> str:
@@ -137,7 +146,8 @@ def coupling_error(
     }
     name = experiment.name.partition("/")[2] or experiment.name
     units = {n: simulated.units[n] for n in changes}
-    return CouplingError(name, changes, noise, units, remedy, {n: _range(simulated[n]) for n in changes})
+    ranges = {n: _range(simulated[n]) for n in changes}
+    return CouplingError(name, changes, noise, units, remedy, ranges, len(simulated.time))
 
 
 def _range(values: FloatArray) -> float:

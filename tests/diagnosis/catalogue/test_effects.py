@@ -53,10 +53,11 @@ def test_neutral_it_is_the_declared_model(superset: Plant):
     with Plant.open(ROOT / "fmus" / "THSA.fmu") as plant:
         declared = run(plant, {})
     neutral = run(superset, {})
-    # The sensor's delay needs a time to be a delay at all: 10 us, a thousandth of the sensor's own lag.
+    # The sensor's delay needs a time to be a delay at all: 10 us, a thousandth of the sensor's own lag. There are two
+    # of them in a row, that of the catalogue and that of the empirical laws.
     slope = np.abs(np.gradient(declared["v"], TIME)).max()
     for name in OUTPUTS:
-        allowed = 1e-5 * slope if name == "v" else 0.0
+        allowed = 2 * 1e-5 * slope if name == "v" else 0.0
         error = np.abs(neutral[name] - declared[name]).max()
         assert error <= 1e-7 * np.ptp(declared[name]) + 1.1 * allowed, name
 

@@ -349,6 +349,35 @@ def test_a_lead_that_a_few_blocks_decide_is_chance(selection: Selection):
     assert names(selection.rivals(winner, [other], ())) == ["b:motor"]
 
 
+def test_a_better_fit_of_a_few_blocks_is_chance(selection: Selection):
+    bump = np.where((TIME > 3.0) & (TIME < 4.0), 0.9, 0.0) * SMOOTH
+    one, other = (left_in_the_fit(scored(n, 0.0), NOISE + more) for n, more in (("a", 0.0), ("b", bump)))
+    assert not selection.fits_better(one, other)
+
+
+@pytest.mark.parametrize(("lead", "better"), [(8.0, False), (10.0, True)])
+def test_a_better_fit_is_worth_three_standard_errors_however_even(
+    selection: Selection, lead: float, better: bool
+):
+    selection.current.residual = 1.01 * NOISE
+    more = np.sqrt(1.0 + lead / (NOISE @ NOISE))
+    one, other = (left_in_the_fit(scored(n, 0.0), k * NOISE) for n, k in (("a", 1.0), ("b", more)))
+    assert selection.fits_better(one, other) is better
+
+
+def test_what_a_fit_shows_is_seen_beside_the_noise_as_it_was_before_weighing(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    weight = 0.2
+    monkeypatch.setattr(selection.bench, "factors", lambda _: np.full(N, weight))
+    selection.current.residual = weight * HELD
+    one, other = (
+        left_in_the_fit(scored(n, 0.0), weight * (left * SMOOTH + NOISE))
+        for n, left in (("a", 0.0), ("b", 0.06))
+    )
+    assert selection.fits_better(one, other)
+
+
 def test_other_places_of_the_same_effect_are_rivals_and_effects_named_before_are_not(selection: Selection):
     winner = scored("a", 0.0)
     made = [winner, scored("a", 0.0), scored("a", 0.0, "gear"), scored("b", 0.0), scored("b", 0.0, "gear")]

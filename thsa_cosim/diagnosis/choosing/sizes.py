@@ -28,7 +28,7 @@ HARDLY = 0.5
 #: ... and fitted where one of them leaves this share of the squared residuals.
 WORTH = 0.7
 #: Sizes grow until one leaves so many times the squared residuals of the one before: a machine that is stuck gets no
-#: better by more of it, and is slow to simulate. Set on the test drives; checked on simulated units.
+#: better by more of it, and is slow to simulate. Set beforehand.
 RISEN = 3.0
 
 

@@ -1,5 +1,6 @@
 """Habits of tools: what `check` says of them, and that a batch copes."""
 
+import time
 import zipfile
 from pathlib import Path
 
@@ -7,12 +8,13 @@ import numpy as np
 import pytest
 from fmu_sources.build import HABITS2, events2, habits2, library, write_fmu
 
-from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
+from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status, TimeIsOver
 from thsa_cosim.check import Finding, Verdict, bench, budget, check_fmu, numerics
+from thsa_cosim.check.trials import Trials
 from thsa_cosim.cli import run_command
 from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu import read_description
-from thsa_cosim.fmu.probe import missing_binary
+from thsa_cosim.fmu.probe import _what_differs, kinked_inputs, missing_binary
 from thsa_cosim.signals import Signals
 
 TIME = np.linspace(0.0, 1.0, 101)
@@ -117,18 +119,79 @@ def test_a_slow_fmu_is_tried_over_its_begin(monkeypatch: pytest.MonkeyPatch) -> 
     assert "so what follows is tried over" in found["runs"].text
     report = check_fmu(slow, deadline_s=0.4, cycles=2)
     runs = next(f for f in report.findings if f.name == "runs")
-    assert "all of it takes more than 0.4 s (see --deadline)" in runs.text
+    assert "; slow: 1 s of it takes" in runs.text
+    assert "all of it more than 0.4 s (see --deadline); tried to" in runs.text
     assert runs.verdict is Verdict.WARNING
 
 
 @pytest.mark.parametrize(("slowness", "verdict"), [(30_000, Verdict.WARNING), (30_000_000, Verdict.FAILED)])
-def test_one_that_becomes_slow_is_told_from_one_that_hangs(slowness: int, verdict: Verdict) -> None:
+def test_one_that_becomes_slow_is_told_from_one_that_hangs(
+    slowness: int, verdict: Verdict, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """50 of 100 steps take 30 ms each, or the first of them never returns; the deadline is 1 s."""
     slow = habits2(f"SLOW={slowness}", "SLOW_FROM=0.495")
-    report = check_fmu(slow, deadline_s=1.0, limit_s=1e-6, cycles=1)
+    monkeypatch.setattr(Trials, "lines", lambda *_: None)
+    report = check_fmu(slow, deadline_s=1.0, cycles=1)
     runs = next(f for f in report.findings if f.name == "runs")
     assert runs.verdict is verdict
-    assert ("s of 1 s: all of it takes more than 1 s" in runs.text) is (verdict is Verdict.WARNING)
+    assert ("all of it more than 1 s (see --deadline); tried to" in runs.text) is (verdict is Verdict.WARNING)
+
+
+def test_the_time_limit_bounds_what_comes_before_the_first_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A whole run takes 3 s where a run may take 0.6 s and the check 0.1 s: one run is made."""
+    begun: list[str] = []
+    run = LocalRunner.run
+
+    def counted(self: LocalRunner, jobs: list[Job], *args: object) -> list[Outcome]:
+        outcomes = run(self, jobs)
+        begun.extend(job.experiment for job in jobs)
+        return outcomes
+
+    monkeypatch.setattr(LocalRunner, "run", counted)
+    report = check_fmu(habits2("SLOW=30000"), deadline_s=0.6, limit_s=0.1, cycles=1)
+    runs = next(f for f in report.findings if f.name == "runs")
+    assert len(begun) <= 1
+    assert runs.verdict is report.verdict is Verdict.WARNING
+    assert "of 1 s: whether it is slow or hangs there was not tried (see --time-limit" in runs.text
+
+
+def test_a_runner_begins_no_job_after_its_time() -> None:
+    experiment = Experiment("step", habits2("SLOW=2000"), STEP, ("y",), TIME, {})
+    jobs = [Job("step")] * 3
+    with LocalRunner([experiment], backend="python", ends_at=time.monotonic() + 1e-3) as runner:
+        while time.monotonic() <= runner._ends_at:
+            time.sleep(1e-3)
+        with pytest.raises(TimeIsOver) as none:
+            runner.run(jobs)
+        runner._ends_at = time.monotonic() + 0.05  # a run takes 0.2 s
+        with pytest.raises(TimeIsOver) as some:
+            runner.run(jobs)
+    assert none.value.outcomes == ()
+    assert [outcome.ok for outcome in some.value.outcomes] == [True]
+
+
+def test_inputs_of_a_run_that_is_cut_are_cut_and_run_no_faster() -> None:
+    description = read_description(habits2())
+    whole, begin = kinked_inputs(description, TIME), kinked_inputs(description, TIME[:40], whole=TIME)
+    assert whole is not None
+    assert begin is not None
+    np.testing.assert_array_equal(begin["u"], whole["u"][:40])
+    assert np.ptp(begin["u"]) > 0.0
+
+
+def test_a_parameter_that_is_declared_constant_is_read_and_not_set(tmp_path: Path) -> None:
+    xml = HABITS2.replace("{flags}", "")
+    at = xml.index('name="gain"')
+    wrong = xml[:at] + xml[at:].replace('variability="fixed"', 'variability="constant"', 1)
+    assert wrong != xml
+    path = write_fmu(tmp_path / "constant.fmu", wrong, library("habits2.c"), "habits2")
+    description = read_description(path)
+    assert description.variables["gain"].start == read_description(habits2()).variables["gain"].start
+    assert "gain" not in [v.name for v in description.parameters]
+    found = lines(path)
+    assert found["description"].verdict is Verdict.WARNING
+    assert 'causality="parameter" and variability="constant"' in found["description"].text
+    assert found["start values"].text == "each of 1 changes some output"
 
 
 def test_where_a_description_lies_too_deep_is_said(tmp_path: Path) -> None:
@@ -207,3 +270,14 @@ def test_changes_that_fall_with_the_step_are_told_from_those_that_do_not() -> No
     random = numerics.judge_shorter_steps(judged, runs([0.0, 0.5, 0.0, 0.5]))
     assert "shorter steps change as much: no step is known to be right" in random[1]
     assert converging[0] is random[0] is Verdict.FAILED
+    nobodys = numerics.judge_shorter_steps(judged, runs([0.4, 0.2, 0.1, 0.05]), nobodys=True)
+    assert nobodys[0] is Verdict.WARNING
+    assert "the FMU declares none; see --step" in nobodys[1]
+    assert numerics.judge_shorter_steps(judged, runs([0.0, 0.5, 0.0, 0.5]), nobodys=True)[0] is Verdict.FAILED
+
+
+def test_of_unknowns_that_are_expected_only_the_difference_is_said() -> None:
+    expected = "ModelStructure/InitialUnknowns does not contain the expected set of variables."
+    said = _what_differs(f"{expected} Expected {{a, b[1,2], c}} but was {{a, d}}.")
+    assert said == f"{expected[:-1]}: it lacks b[1,2], c; it has too much d"
+    assert _what_differs("another") == "another"

@@ -13,7 +13,7 @@ from thsa_cosim.batch.job import Experiment, Job, PlantRun, Reducer, Wrapper
 from thsa_cosim.batch.journal import Journal, JournalRow, JournalTable, read_journal
 from thsa_cosim.batch.local import LocalRunner
 from thsa_cosim.batch.outcome import Outcome, Status
-from thsa_cosim.batch.runner import Runner
+from thsa_cosim.batch.runner import Runner, TimeIsOver
 
 __all__ = [
     "Experiment",
@@ -27,6 +27,7 @@ __all__ = [
     "Reducer",
     "Runner",
     "Status",
+    "TimeIsOver",
     "Wrapper",
     "read_journal",
 ]

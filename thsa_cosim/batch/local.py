@@ -16,7 +16,7 @@ from thsa_cosim.batch.job import Experiment, Job
 from thsa_cosim.batch.outcome import Outcome, Status
 from thsa_cosim.batch.post_mortem import CHANNEL, CLOSED, GARBLED, SILENT, Cause, post_mortem
 from thsa_cosim.batch.process import WorkerProcess
-from thsa_cosim.batch.runner import OnOutcome, check_jobs, wrapper_names
+from thsa_cosim.batch.runner import OnOutcome, TimeIsOver, check_jobs, wrapper_names
 from thsa_cosim.batch.study import Study
 from thsa_cosim.closing import Closing
 from thsa_cosim.errors import ParameterError, StudyError
@@ -51,6 +51,7 @@ class LocalRunner(Closing):
         *,
         workers: int = 1,
         deadline_s: float | None = None,
+        ends_at: float | None = None,
         memory_limit_mb: float | None = None,
         reuse: Reuse = "fresh",
         stepping: Stepping = "free",
@@ -68,6 +69,8 @@ class LocalRunner(Closing):
             Number of processes.
         deadline_s
             Wall time after which a run is killed (to 0.05 s), s; None: never.
+        ends_at
+            Time (of ``time.monotonic``) after which no further job is begun: ``run`` raises TimeIsOver.
         memory_limit_mb
             MiB that one worker may grow beyond its idle size; None: no limit.
         reuse
@@ -98,6 +101,7 @@ class LocalRunner(Closing):
         self._wrapped = wrapper_names(experiments)
         self._count = workers
         self._deadline = deadline_s
+        self._ends_at = ends_at
         self._memory_limit = None if memory_limit_mb is None else int(memory_limit_mb * 2**20)
         self._recycle_runs = recycle_runs
         self._recycle_growth = int(recycle_growth_mb * 2**20)
@@ -136,6 +140,7 @@ class LocalRunner(Closing):
         if not self._finalizer.alive:
             raise StudyError("The runner is closed; open a new one.")
         jobs = list(jobs)
+        self._end_in_time(())
         check_jobs(jobs, self._study.descriptions, self._wrapped)
         batch = Batch(jobs, on_outcome)
         try:
@@ -148,12 +153,19 @@ class LocalRunner(Closing):
             while batch.left:
                 self._staff(min(self._count, batch.waiting + len(batch.index)), len(batch.retries))
                 self._feed(batch)
+                left = batch.left
                 self._wait(batch)
+                if 0 < batch.left < left:
+                    self._end_in_time(batch.result())
         except BaseException:
             for worker in [w for w in self._workers if w.assigned]:
                 self._dismiss(worker)
             raise
         return batch.result()
+
+    def _end_in_time(self, outcomes: Sequence[Outcome]) -> None:
+        if self._ends_at is not None and time.monotonic() > self._ends_at:
+            raise TimeIsOver(outcomes)
 
     def close(self) -> None:
         """Stop the workers and remove all folders; safe to call twice."""

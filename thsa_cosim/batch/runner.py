@@ -13,6 +13,14 @@ OnOutcome = Callable[[int, Outcome], None]
 """Called with a job's index and its outcome, in order of completion, in the caller's thread."""
 
 
+class TimeIsOver(Exception):
+    """The time after which a runner begins no further job; ``outcomes``: of the jobs that had ended."""
+
+    def __init__(self, outcomes: Sequence[Outcome] = ()) -> None:
+        super().__init__("the time for these runs is over")
+        self.outcomes = tuple(outcomes)
+
+
 class Runner(Protocol):
     """Runs batches of jobs; a context manager."""
 

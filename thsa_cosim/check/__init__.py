@@ -47,7 +47,8 @@ def check_fmu(
     deadline_s
         Wall time after which a run is killed, s.
     limit_s
-        Wall time after which no further line is begun, s; a line says what was not tried.
+        Wall time after which no further run is begun, s; a line says what was not tried. The first run is made
+        in any case, so the check ends within about ``limit_s`` and one ``deadline_s``.
     cycles
         Runs over which memory and file handles are watched.
     on_finding

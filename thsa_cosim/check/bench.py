@@ -7,11 +7,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
+from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status, TimeIsOver
 from thsa_cosim.batch.handling import HandlingTrial, try_input_handling
 from thsa_cosim.batch.repetition import try_repetition
 from thsa_cosim.check import numerics
-from thsa_cosim.check.budget import LONGEST_RUN, SLOW_SHARES, TOTAL, Budget, Watch, is_slow
+from thsa_cosim.check.budget import LEAST, LONGEST_RUN, SLOW_SHARES, TOTAL, Budget, Watch, is_slow
 from thsa_cosim.check.excitation import Excitation
 from thsa_cosim.check.finding import Finding, Verdict
 from thsa_cosim.fmu import FmuDescription, probe
@@ -51,6 +51,10 @@ class Bench:
         self._given = excitation
         self._values = dict(excitation.values)
         self._time = excitation.communication_points(description)
+        self._whole = self._time  # the run whose inputs are given, of which ``_time`` may be the begin
+        self._seen: tuple[Outcome, FloatArray] | None = (
+            None  # the last run that told something, and its points
+        )
         self._inputs = self._excited()
         self._deadline = deadline_s
         self._on_finding = on_finding
@@ -68,6 +72,7 @@ class Bench:
         self._runs_changed = False
         self._slowness = ""
         self._cut = False
+        self._is_unsettled = False
         self._changed = {
             name: value
             for name, value in probe.changed_parameters(description).items()
@@ -86,6 +91,7 @@ class Bench:
             ends=self._given.ends,
             times=times,
             only=only,
+            whole=self._whole if time is None else None,
         )
 
     def _note(self, name: str, verdict: Verdict, text: str, **values: float) -> None:
@@ -117,6 +123,8 @@ class Bench:
         kind: Kind | None = None,
         more: Sequence[Experiment] = (),
         backend: Backend | Literal["auto"] | None = "auto",
+        *,
+        in_time: bool = True,
     ) -> LocalRunner:
         """Open one worker process with "trial", "halved" and "doubled" (step), "short" (footprint) and ``more``."""
         experiments = [
@@ -132,6 +140,7 @@ class Bench:
         return LocalRunner(
             experiments,
             deadline_s=self._deadline,
+            ends_at=self._watch.ends_at if in_time else None,
             reuse=reuse,
             kind=kind or self._kind,
             backend=self._backend if backend == "auto" else backend,
@@ -140,12 +149,20 @@ class Bench:
         )
 
     def _many(
-        self, runner: LocalRunner, jobs: Sequence[Job], *, stop_at_failure: bool = False
+        self, runner: LocalRunner, jobs: Sequence[Job], *, stop_at_failure: bool = False, least: int = LEAST
     ) -> list[Outcome]:
-        """Outcomes of ``jobs`` one after the other; fewer where they take longer than a line may."""
+        """Outcomes of ``jobs`` one after the other; fewer where they take longer than a line may.
+
+        TimeIsOver where the time for the check is over before there are ``least``.
+        """
         outcomes: list[Outcome] = []
         for k in self._watch.while_affordable(len(jobs)):
-            outcomes += runner.run([jobs[k]])
+            try:
+                outcomes += runner.run([jobs[k]])
+            except TimeIsOver:
+                if len(outcomes) < least:
+                    raise
+                break
             if stop_at_failure and not outcomes[-1].ok:
                 break
         return outcomes
@@ -163,6 +180,28 @@ class Bench:
 
     def first_outcome(self) -> tuple[Outcome, str]:
         """The first run that succeeds, whole if possible, and what is to be said where it is not."""
+        whole = self._time
+        try:
+            return self._settled()
+        except TimeIsOver:
+            return self._when_time_is_over(whole)
+
+    def _when_time_is_over(self, whole: FloatArray) -> tuple[Outcome, str]:
+        """What is known of the first run where the time is over before it is settled how to run."""
+        if self._seen is None:
+            self._run_once(in_time=False)
+        assert self._seen is not None
+        outcome, self._time = self._seen
+        if outcome.ok and len(self._time) < len(whole):
+            return outcome, f"; tried to {np.ptp(self._time):.3g} s of {np.ptp(whole):g} s"
+        found = _KILLED.search(outcome.reason) if outcome.status is Status.TIMEOUT else None
+        if found and np.count_nonzero(whole <= float(found[1])) >= _FEWEST:
+            self._is_unsettled = True
+            reason = f"{outcome.reason} of {whole[-1]:g} s: whether it is slow or hangs there was not tried"
+            return replace(outcome, reason=f"{reason} (see --time-limit and --deadline)"), ""
+        return outcome, ""
+
+    def _settled(self) -> tuple[Outcome, str]:
         whole = self._time
         outcome = self._try()
         reason, doubt = outcome.reason, ""
@@ -189,7 +228,7 @@ class Bench:
         if len(before) < _FEWEST:
             return failed, ""
         whole = self._time
-        self._shorten(before)
+        self._cut_at(before)
         outcome = self._try()
         if not outcome.ok:
             self._shorten(whole)
@@ -209,13 +248,26 @@ class Bench:
         self._inputs = moving
         return replace(failed, reason=f"{failed.reason}; with its inputs at rest it fails, too"), ""
 
+    @property
+    def _moving(self) -> tuple[str, ...]:
+        """Inputs that move, or are the user's; in the begin of a run some are still at rest."""
+        if self._inputs is None:
+            return ()
+        given = self._given.inputs is not None or len(self._time) == len(self._whole)
+        return tuple(n for n, v in self._inputs.values.items() if given or np.ptp(v[: len(self._time)]) > 0.0)
+
     def _still(self) -> Signals:
         assert self._inputs is not None
         held = {n: np.full(len(self._time), v[0]) for n, v in self._inputs.values.items()}
         return Signals(self._time, held)
 
     def _shorten(self, time: FloatArray) -> None:
-        self._time = time
+        self._time = self._whole = time
+        self._inputs = self._excited()
+
+    def _cut_at(self, begin: FloatArray) -> None:
+        """Run the begin of an experiment, with its inputs as they are."""
+        self._time = begin
         self._inputs = self._excited()
 
     def _cut_to_what_is_fast(self, killed: Outcome) -> tuple[Outcome, str]:
@@ -223,7 +275,7 @@ class Bench:
         whole = self._time
         for share in SLOW_SHARES:
             points = max(int(share * len(whole)), 2)
-            self._shorten(whole[:points])
+            self._cut_at(whole[:points])
             outcome = self._run_once()
             if outcome.status is Status.TIMEOUT:
                 continue
@@ -231,14 +283,17 @@ class Bench:
             if not outcome.ok or not (slow or self._is_slow_later(killed, whole)):
                 break
             fast = int(np.clip(points * LONGEST_RUN / max(outcome.duration_s, 1e-9), 2, points))
-            self._shorten(whole[:fast])
+            pace = outcome.duration_s / np.ptp(self._time)
+            self._cut_at(whole[:fast])
             self._cut = True
-            outcome = self._try()
-            done = f"{np.ptp(self._time):.3g} s of {np.ptp(whole):g} s"
-            return outcome, f"; only {done}: all of it takes more than {self._deadline:g} s (see --deadline)"
+            slow_text = (
+                f"; slow: 1 s of it takes {pace:.2g} s, all of it more than {self._deadline:g} s (see --deadline);"
+                f" tried to {np.ptp(self._time):.3g} s of {np.ptp(whole):g} s"
+            )
+            return self._try(), slow_text
         if outcome.ok or outcome.status is Status.TIMEOUT:
             return killed, ""
-        tried = f"over {np.ptp(self._time):g} s, with inputs that move faster, it fails ({outcome.reason})"
+        tried = f"over its first {np.ptp(self._time):g} s it fails ({outcome.reason})"
         return replace(killed, reason=f"{killed.reason}; {tried}: see --deadline, --duration and --input"), ""
 
     def _is_slow_later(self, killed: Outcome, whole: FloatArray) -> bool:
@@ -247,7 +302,7 @@ class Bench:
         before = whole[whole <= _BEFORE * float(found[1])] if found else whole[:0]
         if len(before) < _FEWEST:
             return False
-        self._shorten(before)
+        self._cut_at(before)
         outcome = self._run_once()
         return outcome.status is Status.TIMEOUT or is_slow(outcome.duration_s, 1.0, self._deadline)
 
@@ -256,7 +311,7 @@ class Bench:
         outcome = self._first_once()
         if outcome.ok and outcome.duration_s > LONGEST_RUN and self._is_free and not self._cut:
             seconds, points = np.ptp(self._time), len(self._time)
-            self._shorten(self._time[: int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))])
+            self._cut_at(self._time[: int(np.clip(points * LONGEST_RUN / outcome.duration_s, 2, points))])
             self._slowness = (
                 f"; it took {outcome.duration_s:.3g} s, so what follows is tried over"
                 f" {np.ptp(self._time):.3g} s of {seconds:g} s"
@@ -266,7 +321,7 @@ class Bench:
         if told or not outcome.ok or self._kind != "co-simulation":
             return outcome
         self._handling = try_input_handling(
-            self._experiment("handling", self._time), deadline_s=self._deadline, **self._limits
+            self._experiment("handling", self._time), deadline_s=self._deadline, **self._options
         )
         best = self._handling.best
         self._mode = None if best is None else best.mode
@@ -276,12 +331,20 @@ class Bench:
         """Run once; see whether a second run of a foreign FMU may share the process."""
         if is_ours(self._description) or self._fault:
             return self._run_once()
-        repetition = try_repetition(
-            self._experiment("trial", self._time),
-            kind=self._kind,
-            deadline_s=self._deadline,
-            backend=self._backend,
-        )
+        try:
+            repetition = try_repetition(
+                self._experiment("trial", self._time),
+                kind=self._kind,
+                deadline_s=self._deadline,
+                backend=self._backend,
+                ends_at=self._watch.ends_at,
+            )
+        except TimeIsOver as over:
+            if not over.outcomes:
+                raise
+            self._remember(over.outcomes[0])
+            raise
+        self._remember(repetition.first)
         self._fault, self._limits = repetition.fault, repetition.limits
         return repetition.first
 
@@ -290,9 +353,20 @@ class Bench:
         """The same bits, and a process starts a second earlier than with machine code."""
         return "python" if len(self._time) < _LONG else None
 
-    def _run_once(self) -> Outcome:
-        with self._runner() as runner:
-            return runner.run([Job("trial")])[0]
+    @property
+    def _options(self) -> dict[str, Any]:
+        return {**self._limits, "ends_at": self._watch.ends_at}
+
+    def _run_once(self, *, in_time: bool = True) -> Outcome:
+        with self._runner(in_time=in_time) as runner:
+            (outcome,) = runner.run([Job("trial")])
+        self._remember(outcome)
+        return outcome
+
+    def _remember(self, outcome: Outcome) -> None:
+        """Keep what is to be said of the FMU where the time is over before more is known."""
+        if outcome.ok or self._seen is None or not self._seen[0].ok:
+            self._seen = outcome, self._time
 
     def _may_be_cut(self) -> bool:
         given = self._given

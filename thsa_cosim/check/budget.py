@@ -9,7 +9,7 @@ import numpy as np
 SECONDS = 20.0
 """Wall time that each line of repeated runs may take."""
 TOTAL = 300.0
-"""Wall time [s] after which a check begins no further line."""
+"""Wall time [s] after which a check begins no further run."""
 LEAST = 3
 """Runs that are made however long they take."""
 SLOW_SHARES = (1 / 8, 1 / 64, 1 / 512)
@@ -49,9 +49,14 @@ class Watch:
     start: float = field(default_factory=time.monotonic)
 
     @property
+    def ends_at(self) -> float:
+        """The time, of ``time.monotonic``, after which nothing more is begun."""
+        return self.start + self.limit_s
+
+    @property
     def is_over(self) -> bool:
         """Whether nothing more is begun."""
-        return time.monotonic() - self.start > self.limit_s
+        return time.monotonic() > self.ends_at
 
     def while_affordable(self, count: int) -> Iterator[int]:
         """Yield 0, 1, ... ``count`` - 1; at least ``LEAST``, then as long as a line of repeated runs may take.

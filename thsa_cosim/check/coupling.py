@@ -41,7 +41,11 @@ def system_lines(description: SystemDescription) -> Iterator[tuple[str, Judged]]
 
 
 def coupling_line(
-    description: SystemDescription, experiment: Experiment, first: Signals, deadline_s: float
+    description: SystemDescription,
+    experiment: Experiment,
+    first: Signals,
+    deadline_s: float,
+    ends_at: float | None = None,
 ) -> Judged:
     """Halve the steps of all Co-Simulation components and compare."""
     stepped = [c for c in description.system.components if c.execution == "coupled"]
@@ -49,7 +53,9 @@ def coupling_line(
         return Verdict.NOT_TRIED, "no component is coupled by communication steps", {}
     with tempfile.TemporaryDirectory(prefix="thsa-cosim-halved-") as folder:
         halved = write_halved(description, Path(folder) / "halved.ssp")
-        with LocalRunner([replace(experiment, fmu=halved)], deadline_s=2.0 * deadline_s) as runner:
+        with LocalRunner(
+            [replace(experiment, fmu=halved)], deadline_s=2.0 * deadline_s, ends_at=ends_at
+        ) as runner:
             outcome = runner.run([Job(experiment.name)])[0]
     if not outcome.ok or outcome.signals is None:
         return Verdict.WARNING, f"halved, it fails: {outcome.status}: {outcome.reason}", {}

@@ -77,13 +77,18 @@ def halving(coarse: Signals, fine: Signals) -> tuple[float, str]:
     return largest_change(coarse.values, {n: fine[n][::2] for n in coarse.names}, jumps=True)
 
 
-def judge_shorter_steps(judged: Judged, runs: Sequence[tuple[float, Outcome]]) -> Judged:
+def judge_shorter_steps(
+    judged: Judged, runs: Sequence[tuple[float, Outcome]], nobodys: bool = False
+) -> Judged:
     """Add to the line of a step that is too long the first shorter one whose halving changes little enough.
 
     ``runs``: (step, outcome), each half of the one before, the first one being half of what was judged.
+    ``nobodys``: neither the FMU nor the user says how long a step is, so a shorter one that does is no failure.
     """
     verdict, text, values = judged
     last = 0.0, np.inf
+    if nobodys:
+        text = f"{text} (a step of this check: the FMU declares none; see --step)"
     for (step, coarse), (_, fine) in pairwise(runs):
         if coarse.signals is None or fine.signals is None:
             break
@@ -91,11 +96,11 @@ def judge_shorter_steps(judged: Judged, runs: Sequence[tuple[float, Outcome]]) -
         if change <= STEP_WARNING:
             mild = values.get("change", np.inf) <= STEP_FAILED
             text = f"{text}; halving {step:g} s changes {change:.1e}: use that step"
-            return Verdict.WARNING if mild else verdict, text, {**values, "usable_step_s": step}
+            return Verdict.WARNING if mild or nobodys else verdict, text, {**values, "usable_step_s": step}
         last = step, change
     if last[1] < _FALLS * values.get("change", 0.0):
         text = f"{text}; it falls with the step, but halving {last[0]:g} s still changes {last[1]:.1e}"
-        return verdict, f"{text}: use a shorter one", values
+        return Verdict.WARNING if nobodys else verdict, f"{text}: use a shorter one", values
     return verdict, f"{text}, and shorter steps change as much: no step is known to be right", values
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from thsa_cosim.batch import Job, LocalRunner, Outcome
+from thsa_cosim.batch import Job, LocalRunner, Outcome, TimeIsOver
 from thsa_cosim.batch.handling import HandlingTrial, largest_change, refined, said
 from thsa_cosim.batch.own_step import moves_within
 from thsa_cosim.check import coupling, numerics
@@ -71,7 +71,8 @@ class Trials(Bench):
         whole = self._time
         outcome, doubt = self.first_outcome()
         if not outcome.ok or outcome.signals is None:
-            self._note("runs", Verdict.FAILED, f"{outcome.status}: {outcome.reason}")
+            failed = Verdict.WARNING if self._is_unsettled else Verdict.FAILED
+            self._note("runs", failed, f"{outcome.status}: {outcome.reason}")
             for name in later:
                 self._note(name, Verdict.NOT_TRIED, "the first run failed")
             return False
@@ -104,10 +105,17 @@ class Trials(Bench):
         }
         for name in tuple(left):
             if self._watch.is_over:
-                text = f"{self._watch.limit_s:g} s are over (--time-limit): not tried are {', '.join(left)}"
-                self._note("time", Verdict.WARNING, text)
+                self._say_time_is_over(f"not tried are {', '.join(left)}")
                 return
-            left.pop(name)()
+            try:
+                left.pop(name)()
+            except TimeIsOver:
+                untried = f"; not tried are {', '.join(left)}" if left else ""
+                self._say_time_is_over(f"not finished is {name}{untried}")
+                return
+
+    def _say_time_is_over(self, what: str) -> None:
+        self._note("time", Verdict.WARNING, f"{self._watch.limit_s:g} s are over (--time-limit): {what}")
 
     def _whose_duration(self) -> str:
         stop = self._description.default_experiment.stop
@@ -119,7 +127,7 @@ class Trials(Bench):
             return "the given inputs"
         if self._inputs is None:
             return "no floating-point inputs to move"
-        if self._rests:
+        if self._rests or not self._moving:
             return "inputs at their start values"
         return "inputs ramping away from their start values, with kinks"
 
@@ -133,11 +141,15 @@ class Trials(Bench):
             self._note(
                 "inputs", Verdict.OK, f"linear within a step, exactly ({mode}; an FMU of this toolkit)"
             )
+        elif not self._moving:
+            text = f"they do not move yet in the first {np.ptp(self._time):.3g} s, which were tried: see --duration"
+            self._note("inputs", Verdict.NOT_TRIED, text)
+            return
         elif self._kind == "model-exchange" or self._handling is not None:
             trial = self._handling or HandlingTrial("", (), True)
             self._take("inputs", numerics.judge_handling(trial, self._kind))
         every = [v.name for v in probe.excitable(self._description)]
-        names = every[: self._budget.runs(_ONE_BY_ONE)]
+        names = [n for n in every if n in self._moving][: self._budget.runs(_ONE_BY_ONE)]
         if self._given.inputs is not None or self._rests or len(names) < 2:
             return
         alone = [self._experiment("none", self._time, self._still())]
@@ -176,7 +188,7 @@ class Trials(Bench):
             found = dict(zip(tried, outcomes, strict=False))
             # A failure that would come after the end of the run shows with another time only.
             again = [Job("trial", {n: v}) for n in self._silent(found) for v in tried[n][1:]]
-            for job, outcome in zip(again, self._many(runner, again), strict=False):
+            for job, outcome in zip(again, self._many(runner, again, least=0), strict=False):
                 (parameter,) = job.values
                 if outcome.ok and self._silent({parameter: found[parameter]}):
                     found[parameter] = outcome
@@ -239,7 +251,12 @@ class Trials(Bench):
         name = "communication step"
         if isinstance(self._description, SystemDescription):
             trial = self._experiment("trial", self._time)
-            self._take(name, coupling.coupling_line(self._description, trial, self._first, self._deadline))
+            self._take(
+                name,
+                coupling.coupling_line(
+                    self._description, trial, self._first, self._deadline, self._watch.ends_at
+                ),
+            )
             return
         if self._kind != "co-simulation":
             self._note(name, Verdict.NOT_TRIED, "Model Exchange: the importer's solver steps")
@@ -252,13 +269,22 @@ class Trials(Bench):
             self._take(name, self._declared_step(step, fixed))
             return
         if judged[0] is Verdict.FAILED:
-            judged = numerics.judge_shorter_steps(
-                judged, [(step / 2, halved), *self._shorter_runs(step, self._time, self._inputs)]
-            )
+            try:
+                shorter = self._shorter_runs(step, self._time, self._inputs)
+            except TimeIsOver:
+                self._take(name, (judged[0], f"{judged[1]}; shorter ones were not tried", judged[2]))
+                raise
+            judged = numerics.judge_shorter_steps(judged, [(step / 2, halved), *shorter], self._step_is_ours)
         self._take(name, judged)
         if len(self._time) > 2 and self._given.inputs is None:  # else the step is the user's
             change = judged[2].get("change", 0.0)
             self._take("longer step", numerics.judge_longer_step(self._first, doubled, step, change))
+
+    @property
+    def _step_is_ours(self) -> bool:
+        """Whether neither the FMU nor the user says how long a step is."""
+        given = self._given
+        return given.time is None and given.step is None and not self._description.default_experiment.step
 
     def _moves_within(self, inputs: Signals | None) -> bool:
         return moves_within(self._description, inputs)
@@ -300,6 +326,7 @@ class Trials(Bench):
         if (
             self._given.inputs is not None
             or self._rests
+            or not self._moving
             or not unknown
             or self._kind != "co-simulation"
             or not self._halves

@@ -1,5 +1,6 @@
 """What an FMU says about itself: ``modelDescription.xml`` as frozen objects (FMI 1.0, 2.0 and 3.0)."""
 
+import io
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -92,7 +93,9 @@ class FmuDescription:
         return tuple(
             v
             for v in self.variables.values()
-            if v.causality in ("parameter", "structuralParameter") and (v.is_scalar or v.is_alias)
+            if v.causality in ("parameter", "structuralParameter")
+            and v.variability != "constant"
+            and (v.is_scalar or v.is_alias)
         )
 
     @cached_property
@@ -141,7 +144,7 @@ def read_description(path: Path | str) -> FmuDescription:
         # Many vendor FMUs break the schema in harmless ways; `thsa-cosim check` reports those.
         # fmpy gets an open file, as it does not close what it opens when it raises.
         with path.open("rb") as file:
-            raw = read_model_description(file, validate=False)
+            raw = read_model_description(_with_legal_constants(xml) or file, validate=False)
             platforms = tuple(sorted({*fmpy.supported_platforms(file), *_windows_paths(file)}))
     except Exception as error:
         message = " ".join(str(error).split()) or type(error).__name__
@@ -198,6 +201,30 @@ def read_description(path: Path | str) -> FmuDescription:
             for unknown in raw.outputs
         },
     )
+
+
+def _with_legal_constants(xml: bytes) -> IO[bytes] | None:
+    """An archive with the description that fmpy can read where parameters are declared constant; else None.
+
+    FMI 2.0.4 (clause 2.2.7) forbids that pair, and some tools write it. Their value is known and cannot be set.
+    """
+    if b'variability="constant"' not in xml:
+        return None
+    root = ElementTree.fromstring(xml)
+    constants = [
+        v
+        for v in root.findall("ModelVariables/*")
+        if (v.get("causality"), v.get("variability")) == ("parameter", "constant")
+        and v.get("initial") is None
+    ]
+    if not constants:
+        return None
+    for variable in constants:
+        variable.set("initial", "exact")
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as target:
+        target.writestr("modelDescription.xml", ElementTree.tostring(root, encoding="utf-8"))
+    return archive
 
 
 def _deeper(archive: zipfile.ZipFile) -> str:

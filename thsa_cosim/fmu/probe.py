@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -98,7 +99,29 @@ def validation_messages(path: Path) -> tuple[str, ...]:
             problems = validate_fmu(str(path))
     except Exception as error:  # the validation itself stumbles over some descriptions
         problems = [f"the validation stopped: {type(error).__name__}: {error}"]
-    return tuple(" ".join(str(problem).split()) for problem in problems)
+    return tuple(_what_differs(" ".join(str(problem).split())) for problem in problems)
+
+
+def _what_differs(problem: str) -> str:
+    """Of two sets of variables, name those that one of them lacks."""
+    found = _SETS.fullmatch(problem)
+    if found is None:
+        return problem
+    wanted, there = (dict.fromkeys(found[group].split(", ")) for group in ("wanted", "there"))
+    apart = {
+        "it lacks": [n for n in wanted if n not in there],
+        "it has too much": [n for n in there if n not in wanted],
+    }
+    said = [
+        f"{what} {', '.join(names[:_NAMED])}" + (f" and {len(names) - _NAMED} more" if names[_NAMED:] else "")
+        for what, names in apart.items()
+        if names
+    ]
+    return f"{found['where']}: {'; '.join(said)}" if said else problem
+
+
+_SETS = re.compile(r"(?P<where>.*?)\.? Expected \{(?P<wanted>.*)\} but was \{(?P<there>.*)\}\.?")
+_NAMED = 5
 
 
 def missing_binary(description: FmuDescription) -> str:
@@ -201,16 +224,19 @@ def kinked_inputs(
     ends: Mapping[str, float] | None = None,
     times: float = 1.0,
     only: str | None = None,
+    whole: FloatArray | None = None,
 ) -> Signals | None:
     """Return inputs that run with kinks from their start values, each with a shift of its own; None if none can.
 
     ``ends``: value that an input runs to, by name; otherwise a tenth of its range or of its start value, or its
     nominal value. ``times`` scales what nobody declared. ``only`` moves that input alone.
+    ``whole``: points of the run whose begin ``time`` is; its inputs are cut, and run no faster.
     """
     variables = excitable(description)
+    last = (time if whole is None else whole)[-1]
     values = {}
     for k, v in enumerate(variables):
-        share = (time - time[0]) / (time[-1] - time[0])
+        share = (time - time[0]) / (last - time[0])
         course = np.interp(share - 0.04 * (k % 5), *_KNOTS)
         start = v.start or 0.0
         size = (ends or {}).get(v.name, start + _amplitude(v) * (times if is_undeclared(v) else 1.0)) - start

@@ -355,7 +355,7 @@ READ = {
     "contact": ("phi",),
     "winding": "P",
     "torque": ("i_q",),
-    "inverter": ("i_q",),
+    "inverter": ("i_q", "phi"),
 }
 TERMS: dict[str, Law] = {
     "1": lambda q: np.ones(TIME.size),
@@ -390,6 +390,8 @@ TERMS: dict[str, Law] = {
     "|i_q| in the back-EMF": lambda q: np.abs(q["i_q"]),
     "i_q^2 in the back-EMF": lambda q: q["i_q"] ** 2,
     "tanh(i_q/{i_s})": lambda q: np.tanh(q["i_q"] / SHAPES["i_s"]),
+    "tanh(i_q/{i_s}) sin({n} phi)": lambda q: np.tanh(q["i_q"] / SHAPES["i_s"]) * np.sin(2.0 * q["phi"]),
+    "tanh(i_q/{i_s}) cos({n} phi)": lambda q: np.tanh(q["i_q"] / SHAPES["i_s"]) * np.cos(2.0 * q["phi"]),
     "i_q |i_q|": lambda q: q["i_q"] * np.abs(q["i_q"]),
     "u": lambda q: q["u"],
     "u |u|": lambda q: q["u"] * np.abs(q["u"]),

@@ -13,7 +13,7 @@ from diagnosis.analytic import DECLARED, bench, candidates, unknowns
 from thsa_cosim.diagnosis.choosing import forms as room
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged
-from thsa_cosim.diagnosis.choosing.forms import best_form, criterion, likelihood
+from thsa_cosim.diagnosis.choosing.forms import best_form, criterion, likelihood, rivals_forms
 from thsa_cosim.diagnosis.choosing.score import Scored, held_shapes
 from thsa_cosim.diagnosis.choosing.selection import RIVAL_SHARE, RIVAL_WORTH
 from thsa_cosim.diagnosis.choosing.spread import between_models
@@ -295,3 +295,68 @@ def test_nothing_is_screened_where_no_form_waits_for_it(forms: Forms):
     forms.known = {"a": form("a", 80.0)}
     assert forms.best(form("c"), proposals=proposals, offered=[form("b").candidate]) == ("a", ["c"])
     assert forms.screened == []
+
+
+class Rivals:
+    """Other effects beside a choice, what their best forms are, and who was asked."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *best: Any) -> None:
+        self.best = {s.candidate.name: s for s in best}
+        self.asked: list[Any] = []
+        self.choice = rival("c", effect="c:motor")
+        monkeypatch.setattr(room, "best_form", self.best_form)
+
+    def polished(self, one: Any) -> Any:
+        return replace(one, fit=replace(one.fit, cost=1.0))
+
+    def best_form(self, selection: Any, other: Any, scored: Any, proposals: Any, offered: Any) -> Any:
+        assert selection is self
+        assert (scored[0], proposals) == (self.choice, ["proposals"])
+        assert other.fit.cost == 1.0, "with all parameters fitted"
+        self.asked.append(other.candidate.key[-1])
+        return self.best.get(other.candidate.name, other), ()
+
+    def forms(self, *others: Any, offered: Any = ()) -> list[str]:
+        proposals: Any = ["proposals"]
+        found = rivals_forms(self, self.choice, [self.choice, *others], proposals, offered)  # type: ignore[arg-type]
+        return [s.candidate.key[-1] for s in found]
+
+
+def rival(name: str, gain: float = 100.0, **more: Any) -> Any:
+    made = form(name, gain=gain, **more)
+    made.candidate.effect = SimpleNamespace(name=more.get("effect", "a:motor").split(":")[0])
+    return made
+
+
+def test_a_rival_is_compared_in_its_best_form_where_that_is_a_new_fit(monkeypatch: pytest.MonkeyPatch):
+    other = rival("a")
+    offered = [form("b", instead=True).candidate]
+    rivals = Rivals(monkeypatch, rival("b", instead=True))
+    assert rivals.forms(other, offered=offered) == ["b"]
+    assert Rivals(monkeypatch).forms(other, offered=offered) == [], "it is in its best form"
+    assert Rivals(monkeypatch, rival("b")).forms(rival("a", instead=True)) == ["b"], "it is one of several"
+
+
+def test_only_near_rivals_of_other_effects_that_have_forms_are_tried(monkeypatch: pytest.MonkeyPatch):
+    least = RIVAL_SHARE * 100.0
+    offered = [form("b", instead=True).candidate, form("x", effect="c:gear", instead=True).candidate]
+    for other, asked in (
+        (rival("a", least), ["a"]),
+        (rival("a", least - 0.1), []),  # explains less
+        (rival("d", effect="d:motor"), []),  # of one formula
+        (rival("e", effect="c:gear"), []),  # the choice's effect in another place
+    ):
+        rivals = Rivals(monkeypatch)
+        assert rivals.forms(other, offered=offered) == []
+        assert rivals.asked == asked
+    rivals = Rivals(monkeypatch)
+    rivals.forms(rival("a"), offered=[form("b").candidate])
+    assert rivals.asked == [], "a form that is screened itself is at hand already"
+
+
+def test_of_each_rival_the_first_fit_is_tried_once_and_the_next_one_after_it(monkeypatch: pytest.MonkeyPatch):
+    rivals = Rivals(monkeypatch, rival("b"), rival("f", effect="e:motor"))
+    offered = [form("b", instead=True).candidate, form("f", effect="e:motor", instead=True).candidate]
+    others = (rival("d", effect="d:motor"), rival("a"), rival("g"), rival("e", effect="e:motor"))
+    assert rivals.forms(*others, offered=offered) == ["b", "f"]
+    assert rivals.asked == ["a", "e"]

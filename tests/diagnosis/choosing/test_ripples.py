@@ -1,17 +1,22 @@
 """Orders of the machine: integers that are not fitted, unless a free one explains what they leave."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from diagnosis.analytic import bench, candidates, unknowns
+from thsa_cosim.diagnosis.choosing import ripples as room
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import found_effects
 from thsa_cosim.diagnosis.choosing.orders import Machine
-from thsa_cosim.diagnosis.choosing.ripples import on_orders
-from thsa_cosim.diagnosis.choosing.screen import screen
-from thsa_cosim.diagnosis.fitting.fit import refine
+from thsa_cosim.diagnosis.choosing.ripples import freed, on_orders
+from thsa_cosim.diagnosis.choosing.score import Scored
+from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
+from thsa_cosim.diagnosis.fitting.fit import Fit, refine
+from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
 
 #: A motor that turns by 60 rad, and the shaft behind its gear, to which that is 2 rad.
 MACHINE = Machine(
@@ -72,3 +77,71 @@ def test_only_waves_at_an_order_are_held_and_only_until_they_are_in_the_model():
         ),
     )
     assert not any(p.held for p in on_orders(proposals, MACHINE, known))
+
+
+N = 4000
+TIME = np.arange(N) * 5e-3
+CHANNEL = SimpleNamespace(name="v", measured=np.zeros(N), time=TIME, noise=1.0, weight=1.0)
+TRIALS: Any = (
+    SimpleNamespace(case=SimpleNamespace(channels=(CHANNEL,), measured=SimpleNamespace(units={"v": "m/s"}))),
+)
+SMOOTH = 10.0 * np.sin(TIME)
+NOISE = np.random.default_rng(8).standard_normal(N)
+
+
+@pytest.mark.parametrize(
+    ("left", "after", "fails", "is_free"),
+    [
+        (0.5, 0.0, "", True),
+        (0.5, 0.45, "", False),  # explains a fifth of what was left
+        (0.0, 0.0, "", False),  # nothing is left that a free order could explain
+        (0.5, 0.0, "refine", False),
+        (0.5, 0.0, "residuals", False),
+        (0.5, 0.0, "end", False),
+        (0.5, 0.0, "held", False),  # it is free already
+    ],
+)
+def test_a_free_order_counts_with_its_fit_where_it_explains_what_the_integer_leaves(
+    monkeypatch: pytest.MonkeyPatch, left: float, after: float, fails: str, is_free: bool
+):
+    candidate = next(c for c in candidates("cogging") if c.number == 0)
+    held = frozenset() if fails == "held" else frozenset({"n"})
+    nothing = np.zeros(1)
+    proposal = Proposal(candidate, {"n": 12.0}, nothing, 1.0, nothing, 1.0, nothing, held=held)
+    members = Unknowns((*unknowns().members, *unknowns_of(candidate, {"n": 12.0}, {"n"})))
+    fit = Fit(members, members.start, NOISE, np.zeros((N, 1)), np.full(1, 0.5), 1.0, True)
+    residuals = [left * SMOOTH + NOISE, after * SMOOTH + NOISE]
+    choice = Scored(proposal, fit, residuals[0], 1.0, 1.0, 9.0, 1.0)
+    asked: list[Any] = []
+
+    def refined(bench: Any, unknowns: Unknowns, vector: np.ndarray, steps: np.ndarray) -> Fit | None:
+        asked.append((unknowns, vector, steps))
+        return None if fails == "refine" else replace(fit, unknowns=unknowns, vector=vector + 0.01)
+
+    def simulated(unknowns: Unknowns, vectors: np.ndarray, part: str) -> list[np.ndarray | None]:
+        np.testing.assert_array_equal(vectors, fit.vector[None, :] + 0.01)
+        assert (unknowns, part) == (asked[0][0], "validate")
+        return [None if fails == "residuals" else residuals[1]]
+
+    monkeypatch.setattr(room, "refine", refined)
+    monkeypatch.setattr(room, "out_of_range", lambda _: "n" if fails == "end" else "")
+    own: Any = SimpleNamespace(of=lambda part: TRIALS, residuals=simulated)
+    weights: Any = SimpleNamespace(plain=lambda residual, part: residual)
+    said: list[str] = []
+    one, found, validate = freed(own, weights, choice, (fit, residuals[0]), said.append)
+    if not is_free:
+        assert one is choice
+        assert found is fit
+        assert validate is residuals[0]
+        return
+    ((free, vector, steps),) = asked
+    assert np.isinf(free.members[-1].spread), "the order"
+    assert [u.spread for u in free.members[:-1]] == [u.spread for u in members.members[:-1]]
+    assert vector is fit.vector
+    assert steps is fit.steps
+    assert found.unknowns is free
+    assert one.fit is found, "the effect is told with the order of the free fit"
+    assert one.validate is validate
+    assert validate is residuals[1]
+    assert (one.proposal.held, one.proposal.shapes) == (frozenset(), proposal.shapes)
+    assert said == ["fitting cogging:motor with a free order"]

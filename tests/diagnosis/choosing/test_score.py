@@ -302,3 +302,42 @@ def test_fits_share_the_columns_of_the_declared_parameters():
     np.testing.assert_array_equal(shared.information, whole.information)
     np.testing.assert_allclose(shared.folded.information, whole.information)
     assert shared.folded.shared is None
+
+
+@pytest.mark.parametrize(
+    ("p", "misfit", "level", "tries"),
+    [
+        (3.4, 1.0, 1.0, 1),  # 4.8 spreads from the drawing
+        (3.6, 1.0, 1.0, 2),  # 5.2: it may have crept there
+        (-1.6, 1.0, 1.0, 2),
+        (3.6, 0.3, 0.5, 2),  # less than twice the weighed noise, 0.25
+        (3.6, 0.6, 0.5, 1),  # what is missing bends it
+        (3.6, 0.5, 0.5, 1),
+    ],
+)
+def test_a_fit_to_the_noise_far_off_the_drawing_is_tried_from_the_drawing_too(
+    fits: Any, p: float, misfit: float, level: float, tries: int
+):
+    choice, own = scored(fit(2.0, 3.0, 300.0)), Levels(level)
+    fits.queue = [fit(p, misfit, 130.0), fit(1.2, misfit, 110.0)]
+    assert polish(own, choice, choice.fit, HELD).fit.vector[0] == (1.2 if tries == 2 else p)  # type: ignore[arg-type]
+    assert len(fits.asked) == tries
+    if tries == 2:
+        np.testing.assert_array_equal(fits.asked[1][0][2], [1.0, 4.0])
+
+
+class Levels:
+    """Stands for a bench that says how its noise is weighed."""
+
+    def __init__(self, level: float) -> None:
+        self.of_fit = level
+
+    def level(self, part: str) -> float:
+        return {"fit": self.of_fit}[part]
+
+
+@pytest.mark.parametrize(("misfit", "little"), [(1.99, True), (2.01, False)])
+def test_little_is_less_than_twice_the_noise_as_it_is_weighed(misfit: float, little: bool):
+    for level in (0.5, 1.0, 3.0):
+        own: Any = Levels(level)
+        assert room.leaves_little(own, fit(1.0, misfit * level**2, 1.0)) is little

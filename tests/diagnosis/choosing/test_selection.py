@@ -486,3 +486,41 @@ def test_effects_of_larger_sizes_join_what_was_refined_where_that_leads_astray(
         monkeypatch.setattr(room, "is_led_astray", lambda current, found, astray=astray: astray)
         offered: Any = ["offered"]
         assert names(tuple(selection.at_sizes(refined, offered))) == expected
+
+
+@pytest.mark.parametrize(
+    ("left", "is_open"), [(0.99 * LEAST, False), (LEAST, True), (2.0 * LEAST, True), (0.1, True), (1.0, True)]
+)
+def test_a_round_is_open_while_the_model_and_every_fit_leave_structure(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch, left: float, is_open: bool
+):
+    lefts = {id(HELD): 1.0}
+    monkeypatch.setattr(selection.weights, "left", lambda held: lefts[id(held)])
+    more, one = scored("a", 0.3), scored("b", 0.1)
+    lefts[id(more.validate)], lefts[id(one.validate)] = 1.0, left
+    assert selection.is_open([])
+    assert selection.is_open([more, one]) is is_open
+    assert selection.is_open([one, more]) is is_open
+    lefts[id(HELD)] = left
+    assert selection.is_open([more]) is is_open, "the model itself leaves nothing"
+
+
+def test_the_drawing_decides_by_three_standard_errors_and_against_no_recording(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    near, off = scored("a", 0.0), scored("b", 0.0)
+    off.fit.unknowns = SimpleNamespace(is_far=lambda _: True)
+    least = room.SIGMAS**2
+    for lead, better in ((least + 0.5, True), (least - 0.5, False), (0.0, False), (-1.0, False)):
+        off.fit.cost = near.fit.cost + lead
+        assert selection.is_better(near, off) is better
+        assert not selection.is_better(off, near)
+    off.fit.cost = near.fit.cost + least + 0.5
+    monkeypatch.setattr(Selection, "fits_better", lambda self, one, other: one is off)
+    assert not selection.is_better(near, off), "a recording says otherwise"
+    monkeypatch.setattr(Selection, "fits_better", lambda self, one, other: False)
+    for bad in (near, off):
+        misfit, bad.fit.misfit = bad.fit.misfit, 2.5 * N
+        assert not selection.is_better(near, off), "either may be bent by what is missing"
+        bad.fit.misfit = misfit
+    assert selection.is_better(near, off)

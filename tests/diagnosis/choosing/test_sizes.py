@@ -1,5 +1,6 @@
 """Sizes of an effect: where declared parameters are bent to make up for a large one, it is tried over decades."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +14,7 @@ from thsa_cosim.diagnosis.choosing.sizes import FITTED, SIZES, at_sizes, is_led_
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.diagnosis.fitting.identified import _runs
+from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 
 MU = "motorEffect.loadDependentFriction.mu"
 #: Coulomb friction that ends at the end of its range where the load's friction is missing.
@@ -97,3 +99,21 @@ def test_what_further_parts_stand_beside_is_not_pruned() -> None:
     kept, *_, notes = prune(None, None, None, accepted, None, held)  # type: ignore[arg-type]
     assert kept == accepted
     assert notes == []
+
+
+def test_a_shape_that_is_held_is_held_at_every_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    own, base, proposals, held = astray(0.7)
+    shaped = next(p for p in proposals if p.candidate.shapes and len(p.candidate.coefficients) == 1)
+    shape = next(p for p in shaped.candidate.shapes if not p.fixed)
+    asked: list[float] = []
+
+    def spreads(unknowns: Unknowns, vectors: np.ndarray, part: str) -> list[None]:
+        asked.append(next(u.spread for u in unknowns.members if u.name == shape.variable))
+        return [None] * len(vectors)
+
+    monkeypatch.setattr(own, "residuals", spreads)
+    for names in (frozenset(), frozenset({shape.name})):
+        at_sizes(own, base, held, [replace(shaped, held=names)])
+    free, fixed = asked
+    assert np.isinf(free)
+    assert 0.0 < fixed < 1e-3 * abs(shaped.shapes[shape.name])

@@ -93,3 +93,11 @@ def test_a_law_has_a_term_for_each_coefficient_with_its_shapes_put_in():
     assert law.terms[0].shapes["v_f"].value == 1.2345e-3
     assert law.terms[1].shapes["w"].value == 628.3, "an order of the machine is not fitted"
     assert law.held_out_gain == pytest.approx(80.0)
+
+
+def test_the_wave_of_the_voltage_is_offered_beside_the_soft_sign_whose_width_it_shares():
+    variants = [e.variants[0] for e in EMPIRICAL if e.variants[0].block == "EmpiricalVoltage"]
+    (wave,) = [v for v in variants if v.beside]
+    (sign,) = [v for v in variants if v.parameters[0].name == "k_s"]
+    assert {p.name for p in wave.parameters} & {p.name for p in sign.parameters} == {"i_s"}
+    assert not any(e.variants[0].beside for e in EMPIRICAL if e.variants[0] is not wave)

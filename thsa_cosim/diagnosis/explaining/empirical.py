@@ -14,6 +14,7 @@ from pathlib import Path
 from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Variant
+from thsa_cosim.diagnosis.catalogue.effects.inverter_dead_time import PAIRS
 from thsa_cosim.diagnosis.catalogue.extend import (
     EMPIRICAL_NAME,
     extended_class,
@@ -70,6 +71,9 @@ _TAKEN_UP = EffectParameter(
     "s_0", "1", 0.5, "share taken up at the start", "shape", 0.0, 1.0, starts=(0.0, 1.0)
 )
 _SIGN = _shape("i_s", "I", "current over which the sign turns", (0.01, 0.05))
+_ELECTRICAL = EffectParameter(
+    "n", "1", 6.0, "periods per revolution", "shape", 1.0, 144.0, starts=tuple(6.0 * pairs for pairs in PAIRS)
+)
 _FADING = EffectParameter(
     "T_f", "s", 10.0, "time over which E fades", role="shape", lower=0.5, upper=1e5, starts=(5.0, 100.0)
 )
@@ -127,6 +131,12 @@ _LIBRARY: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
         (_k("k_1", "U", "1", 0.3),),
         (_k("k_s", "U", "tanh(i_q/{i_s})", 0.3), _SIGN),
         (_k("k_ii", "U/I^2", "i_q |i_q|", 0.3),),
+        (
+            _k("k_sin", "U", "tanh(i_q/{i_s}) sin({n} phi)", 0.05),
+            _k("k_cos", "U", "tanh(i_q/{i_s}) cos({n} phi)", 0.05),
+            _SIGN,
+            _ELECTRICAL,
+        ),
     ),
     ("SensorEffect", "EmpiricalSensor"): (
         (_k("k_1", "I", "1", 0.01),),
@@ -146,16 +156,19 @@ _ONLY: Mapping[str, tuple[str, ...]] = {
     "EmpiricalRise": ("screw", "guide"),
     "EmpiricalDelay": ("velocitySensor",),
 }
+#: Terms that are only offered once another one of their block is in the model, whose shape they share.
+_BESIDE = {("EmpiricalVoltage", "k_sin")}
 
 
 def _effect(interface: str, block: str, parameters: tuple[EffectParameter, ...]) -> Effect:
+    beside = (block, parameters[0].name) in _BESIDE
     return Effect(
         name=f"{EMPIRICAL_NAME}/{block}.{parameters[0].name}",
         title="Term of an empirical law",
         physics=f"{parameters[0].description} in a sum of such terms",
         source="Brunton, Proctor, Kutz, PNAS 113 (2016) 3932",
         signature="whatever structure the effects with a name leave",
-        variants=(Variant(interface, block, parameters, _ONLY.get(block)),),
+        variants=(Variant(interface, block, parameters, _ONLY.get(block), beside=beside),),
     )
 
 

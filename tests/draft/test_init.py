@@ -316,3 +316,25 @@ def test_a_recording_that_cannot_be_read_says_so(
     assert code == 2
     assert "x.csv: no such file" in capsys.readouterr().err
     assert not (tmp_path / "s.toml").exists()
+
+
+@pytest.mark.parametrize("moving", [("u",), ("u", "turn"), ("turn",), ()])
+def test_a_model_that_another_input_drives_is_not_said_to_stay_at_rest(
+    moving: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two inputs that command, u and turn; those that do not move stay at zero."""
+    turn = (
+        '<ScalarVariable name="turn" valueReference="4" causality="input"><Real start="0"/></ScalarVariable>'
+    )
+    xml = HABITS2.replace("{flags}", "").replace(" </ModelVariables>", f"  {turn}\n </ModelVariables>")
+    fmu = build.write_fmu(tmp_path / "two.fmu", xml, build.library("habits2.c"), "habits2")
+    time = np.linspace(0.0, 1.0, 101)
+    columns = [np.sin(7.0 * time + k) * (name in moving) for k, name in enumerate(("u", "turn"))]
+    table = np.column_stack([time, *columns, np.sin(time)])
+    np.savetxt(tmp_path / "run.csv", table, delimiter=",", header="time [s],u,turn,y", comments="")
+    assert cli.run_command(["init", str(fmu), str(tmp_path / "run.csv"), "-o", str(tmp_path / "s.toml")]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    still = [name for name in ("u", "turn") if name not in moving]
+    assert ("so the model stays at rest" in said) == (not moving)
+    assert ("is ready" in said) == bool(moving)
+    assert (f"No column that changes drives {', '.join(still)};" in said) == bool(moving and still)

@@ -74,11 +74,11 @@ def init(
     click.echo(f"\nThe recordings as the scenario reads them: {preview}")
     if draft.undriven:
         names = ", ".join(variable.name for variable in draft.undriven)
-        click.echo(
-            f"{output} is not ready: nothing drives {names}, so the model stays at rest; name the column under"
-            f" [recordings.columns.{draft.undriven[0].name}] unless it is constant."
-        )
-        return
+        remedy = f"name the column under [recordings.columns.{draft.undriven[0].name}] unless it is constant."
+        if not draft.is_driven:
+            click.echo(f"{output} is not ready: nothing drives {names}, so the model stays at rest; {remedy}")
+            return
+        click.echo(f"No column that changes drives {names}; {remedy}")
     if identify:
         click.echo(
             f"{output} is ready: thsa-cosim check {output} --sensitivity, then thsa-cosim identify {output}"

@@ -34,6 +34,12 @@ class Draft:
     unused: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def is_driven(self) -> bool:
+        """Whether a column that changes drives the model, beside its loads and temperatures."""
+        inputs = (m for m in self.matches if m.variable.causality == "input" and not m.column.constant)
+        return any(not _is_temperature(m.variable) and not _is_load(m.variable) for m in inputs)
+
+    @property
     def undriven(self) -> tuple[Variable, ...]:
         """Inputs that command or load the model, but have no column, or one that never changes."""
         still = tuple(

@@ -27,6 +27,7 @@ from thsa_cosim.identify.problem import (
 )
 from thsa_cosim.identify.results import ForceBalance, IdentifyResult, LawResult, PointResult
 from thsa_cosim.identify.silent import note_on, silent_parameters
+from thsa_cosim.identify.step_shift import widened, with_shifts
 from thsa_cosim.identify.unsettled import unsettled
 from thsa_cosim.inspection import (
     Expected,
@@ -118,10 +119,7 @@ class _Search:
     """What has been found so far."""
 
     def __init__(
-        self,
-        scenario: Scenario,
-        points: Sequence[PointProblem],
-        held_out: Sequence[tuple[Case, Recording]],
+        self, scenario: Scenario, points: Sequence[PointProblem], held_out: Sequence[tuple[Case, Recording]]
     ) -> None:
         self.interrupted = False
         self._scenario = scenario
@@ -203,8 +201,7 @@ class _Search:
         if not self._held_out:
             return
         results, laws = self._results(), self._laws()[0]
-        space = self._scenario.parameters
-        shared = [p.name for p in space.parameters]
+        shared = [p.name for p in self._scenario.parameters.parameters]
         found: list[list[float]] = []
         scored: list[tuple[Case, Recording]] = []
         for case, recording in self._held_out:
@@ -243,7 +240,7 @@ class _Search:
             opening,
         )
         if isinstance(coupled, CouplingError):
-            self._coupling = coupled
+            self._coupling = coupled = with_shifts(coupled, point, found)
         if said := (coupled if isinstance(coupled, str) else coupled.sentence()):
             self.note([said])
 
@@ -366,11 +363,12 @@ class _Search:
             return None, [f"there is no force residual: {error}"]
 
     def _results(self) -> list[PointResult]:
-        results = []
-        for k, found in sorted(self._found.items()):
-            if found.result is not None:
-                results.append(replace(found.result, evaluations=self._evaluations(k)))
-        return results
+        shifts = {} if self._coupling is None else self._coupling.moved
+        return [
+            replace(widened(found.result, shifts), evaluations=self._evaluations(k))
+            for k, found in sorted(self._found.items())
+            if found.result is not None
+        ]
 
     def _evaluations(self, k: int) -> int:
         return 0 if self._engine is None else self._engine.evaluations[self._points[k].label]

@@ -28,7 +28,9 @@ LARGE_SHARE = 0.01
 """The same over the range of a signal that no sensor has measured, as in a check."""
 
 _STANDARD_ERRORS = 3.0
-"""A shift of a value, in its standard errors, that is worth a word."""
+"""A shift of a value, in its standard errors, that is worth a word where it is only a bound."""
+LARGE_SHIFT = 1.0
+"""The same from which on a projected shift is a reason against trust, and widens the stated errors."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,16 @@ class CouplingError:
     """Of the signals, in the same: what counts where there is no noise, as in a tuning."""
     samples: int = 0
     """Compared; a change that looks like that of one parameter moves it by sqrt(samples) times change over noise."""
+    differences: Mapping[str, FloatArray] = field(default_factory=dict, repr=False, compare=False)
+    """Signals at half the steps less those at the whole ones, (n,) each, in their units."""
+    shifts: Mapping[str, float] = field(default_factory=dict)
+    """Where each identified value would go without steps, in its standard errors; empty where none is known."""
+
+    @property
+    def moved(self) -> Mapping[str, float]:
+        """The shifts where one of them is large, the largest first; else empty."""
+        large = any(abs(s) > LARGE_SHIFT for s in self.shifts.values())
+        return dict(sorted(self.shifts.items(), key=lambda item: -abs(item[1]))) if large else {}
 
     @property
     def has_noise(self) -> bool:
@@ -73,16 +85,30 @@ class CouplingError:
         over = f"{ratio:.2g} times its noise" if self.has_noise else f"{100.0 * ratio:.2g} % of its range"
         size = f"{self.changes[name]:.2g} {self.units[name]} rms, {over}"
         said = f"halving the communication steps changes {name} by {size} ({self.recording})"
+        if self.shifts:
+            return said + self._moved()
         at_worst = ratio * float(np.sqrt(self.samples)) if self.has_noise else 0.0
         if at_worst > _STANDARD_ERRORS:
             said += f", which may move a value by up to {at_worst:.2g} of its standard errors"
         return said
 
+    def _moved(self) -> str:
+        """The large shifts in words, which follow a sentence; "" without any."""
+        if not self.moved:
+            return ""
+        first, *others = [f"{n} by {s:+.2g}" for n, s in self.moved.items() if abs(s) > LARGE_SHIFT]
+        named = ", ".join([f"{first} standard errors", *others])
+        return (
+            f"; without steps it would move {named} (projected on the parameters), and the stated errors are widened by"
+            " as much, in quadrature"
+        )
+
     @property
     def reason(self) -> str:
         """Why values are not to be trusted, or ""."""
         limit = LARGE if self.has_noise else LARGE_SHARE
-        return f"{self.sentence()}; {self.remedy}" if self.worst[1] > limit else ""
+        large = self.worst[1] > limit or bool(self.moved)
+        return f"{self.sentence()}; {self.remedy}" if large else ""
 
     @property
     def note(self) -> str:
@@ -93,6 +119,7 @@ class CouplingError:
         """JSON types."""
         return {
             "recording": self.recording,
+            **({"shifts_in_standard_errors": dict(self.shifts)} if self.shifts else {}),
             "halved": {
                 name: {
                     "rms": change,
@@ -139,15 +166,13 @@ def coupling_error(
         return f"with half the communication steps {experiment.name} fails: {failed.reason}"
     runs = [o.signals for o in outcomes if o.signals is not None]
     finer, simulated = runs[-1], runs[0] if own else simulated
-    changes = {
-        n: float(np.sqrt(np.mean((finer[n][::stride] - simulated[n]) ** 2)))
-        for n in simulated.names
-        if n in finer
-    }
+    differences = {n: finer[n][::stride] - simulated[n] for n in simulated.names if n in finer}
+    changes = {n: float(np.sqrt(np.mean(d**2))) for n, d in differences.items()}
     name = experiment.name.partition("/")[2] or experiment.name
     units = {n: simulated.units[n] for n in changes}
     ranges = {n: _range(simulated[n]) for n in changes}
-    return CouplingError(name, changes, noise, units, remedy, ranges, len(simulated.time))
+    samples = len(simulated.time)
+    return CouplingError(name, changes, noise, units, remedy, ranges, samples, differences)
 
 
 def _range(values: FloatArray) -> float:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from diagnosis.analytic import bench, candidates, unknowns
+from thsa_cosim.diagnosis.choosing import sizes
 from thsa_cosim.diagnosis.choosing.attribution import prune
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
-from thsa_cosim.diagnosis.choosing.sizes import FITTED, SIZES, at_sizes, is_led_astray
+from thsa_cosim.diagnosis.choosing.sizes import FITTED, SIZES, _tried, at_sizes, is_led_astray
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.diagnosis.fitting.identified import _runs
@@ -57,11 +58,27 @@ def test_sizes_go_over_decades_from_the_fit_and_from_the_drawing(monkeypatch: py
     first = next(
         p for p in proposals if p.candidate.coefficients[0].variable == MU and len(p.amplitudes) == 1
     )
+    monkeypatch.setattr(sizes, "RISEN", np.inf)
     at_sizes(own, base, held, [first])
-    tried = asked[0]
+    tried = np.vstack(asked[: len(SIZES)])
     typical, upper = first.candidate.coefficients[0].typical, first.candidate.coefficients[0].upper
     assert set(np.round(tried[:, -1], 9)) == {round(min(size * typical, upper), 9) for size in SIZES}
     assert {tuple(row) for row in tried[:, :-1]} == {tuple(base.vector), tuple(base.unknowns.start)}
+
+
+def test_sizes_end_where_more_of_it_only_does_harm() -> None:
+    squares = {10.0: 8.0, 30.0: 1.0, 100.0: 4.0}  # a KeyError at any larger size
+
+    class Numbered:
+        def residuals(self, u: Any, vectors: np.ndarray, part: Any) -> list[np.ndarray | None]:
+            return [None if v[-1] < 0.0 else np.array([squares[v[-1]] ** 0.5]) for v in vectors]
+
+    plain: Any = SimpleNamespace(prior=lambda v: np.zeros(1))
+    growing = [np.array([size]) for size in SIZES]
+    failing = [np.array([-size]) for size in SIZES]  # a machine that runs away at all of them: all are tried
+    vectors, costs = _tried(Numbered(), plain, [growing, failing])  # type: ignore[arg-type]
+    assert [c for c in costs if np.isfinite(c)] == pytest.approx([8.0, 1.0, 4.0])
+    assert sorted(-float(v[0]) for v in vectors if v[0] < 0.0) == list(SIZES)
 
 
 def test_a_model_is_not_astray_whose_parameters_stay_or_where_an_effect_explains_half() -> None:
@@ -114,6 +131,6 @@ def test_a_shape_that_is_held_is_held_at_every_size(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(own, "residuals", spreads)
     for names in (frozenset(), frozenset({shape.name})):
         at_sizes(own, base, held, [replace(shaped, held=names)])
-    free, fixed = asked
+    free, fixed = dict.fromkeys(asked)  # each the same at every size
     assert np.isinf(free)
     assert 0.0 < fixed < 1e-3 * abs(shaped.shapes[shape.name])

@@ -27,6 +27,9 @@ TRIED, FITTED = 8, 3
 HARDLY = 0.5
 #: ... and fitted where one of them leaves this share of the squared residuals.
 WORTH = 0.7
+#: Sizes grow until one leaves so many times the squared residuals of the one before: a machine that is stuck gets no
+#: better by more of it, and is slow to simulate. Set beforehand.
+RISEN = 3.0
 
 
 def is_led_astray(base: Fit, scored: Sequence[Scored]) -> bool:
@@ -41,11 +44,7 @@ def at_sizes(bench: Bench, base: Fit, held: FloatArray, proposals: Sequence[Prop
     for proposal in _simplest(proposals):
         own = unknowns_of(proposal.candidate, proposal.shapes, proposal.held)
         unknowns = base.unknowns.with_members([u for u in own if u.name not in base.unknowns.names])
-        vectors = _vectors(base, unknowns, proposal)
-        found = bench.residuals(unknowns, vectors, "fit")
-        costs = [
-            np.inf if r is None else cost_of(unknowns, v, r) for v, r in zip(vectors, found, strict=True)
-        ]
+        vectors, costs = _tried(bench, unknowns, _rows(base, unknowns, proposal))
         best = int(np.argmin(costs))
         if costs[best] < WORTH * base.cost:
             begun.append((costs[best], replace(proposal), unknowns, vectors[best]))
@@ -65,20 +64,43 @@ def _simplest(proposals: Sequence[Proposal]) -> list[Proposal]:
     return list(found.values())[:TRIED]
 
 
-def _vectors(base: Fit, unknowns: Unknowns, proposal: Proposal) -> FloatArray:
-    """(m, n) the sizes in the direction that the screening promises, from the fit and from the drawing."""
+def _tried(
+    bench: Bench, unknowns: Unknowns, rows: Sequence[Sequence[FloatArray]]
+) -> tuple[list[FloatArray], list[float]]:
+    """The vectors of every row, sizes growing, as far as they help, and their costs; infinite where a run failed."""
+    vectors: list[FloatArray] = []
+    costs: list[float] = []
+    before = dict.fromkeys(range(len(rows)), np.inf)
+    for size in range(len(SIZES)):
+        going = [k for k in before if size < len(rows[k])]
+        if not going:
+            break
+        asked = [rows[k][size] for k in going]
+        found = bench.residuals(unknowns, np.array(asked), "fit")
+        own = [np.inf if r is None else cost_of(unknowns, v, r) for v, r in zip(asked, found, strict=True)]
+        vectors += asked
+        costs += own
+        before = {k: cost for k, cost in zip(going, own, strict=True) if cost <= RISEN * before[k]}
+    return vectors, costs
+
+
+def _rows(base: Fit, unknowns: Unknowns, proposal: Proposal) -> list[list[FloatArray]]:
+    """The sizes in the direction that the screening promises, growing: a row from the fit, one from the drawing."""
     (coefficient,) = proposal.candidate.coefficients
     known = base.vector.size
     drawn = np.where([u.declared for u in base.unknowns.members], base.unknowns.start, base.vector)
     sign = np.sign(proposal.amplitudes[0]) or 1.0
     if coefficient.lower >= coefficient.neutral:
         sign = 1.0
+    k = unknowns.names.index(coefficient.variable)
     rows = []
     for start in (base.vector, drawn):
+        row: dict[tuple[float, ...], FloatArray] = {}
         for size in SIZES:
             vector = unknowns.start
             vector[:known] = start
-            k = unknowns.names.index(coefficient.variable)
             vector[k] = coefficient.neutral + sign * size * abs(coefficient.typical)
-            rows.append(unknowns.clip(vector))
-    return np.unique(np.array(rows), axis=0)
+            held = unknowns.clip(vector)
+            row.setdefault(tuple(held), held)
+        rows.append(list(row.values()))
+    return rows[:1] if np.array_equal(base.vector, drawn) else rows

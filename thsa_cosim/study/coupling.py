@@ -89,7 +89,7 @@ class CouplingError:
             return said + self._moved()
         at_worst = ratio * float(np.sqrt(self.samples)) if self.has_noise else 0.0
         if at_worst > _STANDARD_ERRORS:
-            said += f", which may move a value by up to {at_worst:.2g} of its standard errors"
+            said += f", which may move a value by up to {at_worst:.0f} of its standard errors"
         return said
 
     def _moved(self) -> str:

@@ -89,7 +89,8 @@ def test_what_half_the_step_changes_is_a_reason_not_to_trust_a_diagnosis(tmp_pat
     assert change["noise"] == 0.01
     assert change["rms"] > 0.5 * change["noise"]
     (note,) = [n for n in result["notes"] if n.startswith("WARNING: halving the communication steps")]
-    assert note.endswith("(fit); lower simulation.step")
+    assert "times its noise (fit), which may move a value by up to" in note
+    assert note.endswith("; lower simulation.step")
     assert result["trust"]["verdict"] == "not-explained"
     assert note.removeprefix("WARNING: ") in result["trust"]["reasons"]
 

@@ -1,6 +1,5 @@
 """States that parameters hold at rest: which they are, and that leaving them out of the solver changes no result."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from fmpy.fmi2 import FMU2Slave
 from scipy.linalg import expm
 
 from thsa_cosim.export import export_fmu
+from thsa_cosim.export.compile import native_platform
 from thsa_cosim.export.expression import select
 from thsa_cosim.export.resting import moving
 from thsa_cosim.fmu import Plant
@@ -74,10 +74,10 @@ def exact(k: float, time: np.ndarray, start: np.ndarray) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("rest")
     (folder / "Rest.mo").write_text(MODEL)
-    yield export_fmu(str(folder / "Rest.mo"), output=folder / "Rest.fmu", platforms=("x86_64-linux",))
+    return export_fmu(str(folder / "Rest.mo"), output=folder / "Rest.fmu", platforms=(native_platform().fmi3,))
 
 
 @pytest.mark.slow

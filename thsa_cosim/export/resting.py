@@ -1,4 +1,4 @@
-"""States that parameters hold at rest: their derivative is 0 as long as a coefficient of parameters alone is switched off.
+"""States that parameters hold at rest: their derivative is 0 whatever else happens, as a coefficient is switched off.
 
 The solver leaves them out of its linear algebra, so that a model with many effects costs what those that act cost.
 """

@@ -1,5 +1,7 @@
 """What half the communication step changes at the values that a study has found."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fmu_sources.build import habits2, lag2
@@ -20,19 +22,20 @@ def euler(parts: int) -> np.ndarray:
     return 1.0 - (1.0 - 0.01 / parts / TAU) ** (parts * np.arange(101))
 
 
+@pytest.mark.parametrize("exchange", [False, True])
 @pytest.mark.parametrize("noise", [1.0, 1e-4])
-def test_the_error_of_a_foreign_fmus_step_is_told_next_to_the_noise(noise: float) -> None:
+def test_the_error_of_a_foreign_fmus_step_is_told_next_to_the_noise(noise: float, exchange: bool) -> None:
     fmu = habits2("EULER")
     with Plant.open(fmu) as plant:
         simulated = plant.run({"tau": TAU}, STEP, ["y"], TIME)
     experiment = Experiment("fit/step", fmu, STEP, ("y",), TIME, {})
-    found = coupling_error(
-        read_description(fmu), SimulationTable(), experiment, {"tau": TAU}, simulated, {"y": noise}
-    )
+    described = replace(read_description(fmu), supports_model_exchange=exchange)
+    found = coupling_error(described, SimulationTable(), experiment, {"tau": TAU}, simulated, {"y": noise})
     assert isinstance(found, CouplingError)
     change = float(np.sqrt(np.mean((euler(2) - euler(1)) ** 2)))
     assert found.changes["y"] == pytest.approx(change, rel=1e-9)
-    assert found.reason == "" if noise == 1.0 else found.reason.endswith("lower simulation.step")
+    remedy = "; lower simulation.step" + ', or set simulation.interface = "model-exchange"' * exchange
+    assert found.reason == "" if noise == 1.0 else found.reason.endswith(remedy)
     assert found.recording == "step"
 
 

@@ -211,7 +211,8 @@ def _halved(
     fine_run, within = outcomes[-1].signals, moves_within(fmu, plain.inputs)
     if fine_run is not None and within and own_step(fine_run.time, fine_run.values) is not None:
         return None  # shorter steps than its own tell nothing
-    return outcomes, 2, "lower simulation.step"
+    exact = ', or set simulation.interface = "model-exchange"' if fmu.supports_model_exchange else ""
+    return outcomes, 2, f"lower simulation.step{exact}"
 
 
 def _run(

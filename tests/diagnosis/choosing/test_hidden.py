@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate, CandidateParameter
-from thsa_cosim.diagnosis.choosing.hidden import HiddenPart, hidden_parts, notes_on_hidden, widening
+from thsa_cosim.diagnosis.choosing.hidden import (
+    HiddenPart,
+    _hidden,
+    hidden_parts,
+    notes_on_hidden,
+    widening,
+)
 from thsa_cosim.diagnosis.choosing.screen import propose
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
@@ -192,3 +198,20 @@ def test_three_parameters_are_listed() -> None:
     moves = {"K_t": 0.1, "T_c": 0.05, "T_d": 0.01}
     (note,) = notes_on_hidden([part(moves)], wider, np.full(3, 1e-3))
     assert "a change of K_t, T_c and T_d does" in note
+
+
+def test_what_the_recordings_ask_for_counts_as_far_as_they_know_it() -> None:
+    """A Gaussian of 5 with the precision 2 beside the drawing's of 0 with 9: mean 10 / 11, variance 1 / 11."""
+    proposal: Any = SimpleNamespace(
+        candidate=candidate("scales"),
+        moves={"K_t": np.array([3.0])},
+        precision=np.array([[4.0]]),
+        amplitudes=np.array([5.0]),
+    )
+    fit: Any = SimpleNamespace(
+        unknowns=SimpleNamespace(names=("K_t",), precision=np.array([1.0])), inflation=2.0
+    )
+    size = np.hypot(10.0 / 11.0, np.sqrt(1.0 / 11.0))
+    part = _hidden(proposal, fit)
+    assert part.size == pytest.approx(size)
+    assert part.moves == pytest.approx({"K_t": -3.0 * size})

@@ -510,7 +510,8 @@ def test_effects_of_larger_sizes_join_what_was_refined_where_that_leads_astray(
     selection: Selection, monkeypatch: pytest.MonkeyPatch
 ):
     refined, larger = [scored("a", 0.3), scored("b", 0.4)], scored("c", 0.1)
-    monkeypatch.setattr(room, "at_sizes", lambda *given: [larger] if given[-1] == ["offered"] else [])
+    own = (selection.bench, selection.current, selection.held, ["offered"])
+    monkeypatch.setattr(room, "at_sizes", lambda *given: [larger] if given == own else [])
     for astray, expected in ((True, ["c:motor", "a:motor", "b:motor"]), (False, ["a:motor", "b:motor"])):
         monkeypatch.setattr(room, "is_led_astray", lambda current, found, astray=astray: astray)
         offered: Any = ["offered"]

@@ -11,11 +11,11 @@ from diagnosis.analytic import bench, candidates, unknowns
 from thsa_cosim.diagnosis.choosing import sizes
 from thsa_cosim.diagnosis.choosing.attribution import prune
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
-from thsa_cosim.diagnosis.choosing.sizes import FITTED, SIZES, _tried, at_sizes, is_led_astray
+from thsa_cosim.diagnosis.choosing.sizes import FITTED, SIZES, _rows, _tried, at_sizes, is_led_astray
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.diagnosis.fitting.identified import _runs
-from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
+from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
 
 MU = "motorEffect.loadDependentFriction.mu"
 #: Coulomb friction that ends at the end of its range where the load's friction is missing.
@@ -64,6 +64,14 @@ def test_sizes_go_over_decades_from_the_fit_and_from_the_drawing(monkeypatch: py
     typical, upper = first.candidate.coefficients[0].typical, first.candidate.coefficients[0].upper
     assert set(np.round(tried[:, -1], 9)) == {round(min(size * typical, upper), 9) for size in SIZES}
     assert {tuple(row) for row in tried[:, :-1]} == {tuple(base.vector), tuple(base.unknowns.start)}
+
+
+def test_a_fit_at_the_drawing_is_tried_from_there_once() -> None:
+    _, base, proposals, _ = astray(0.7)
+    first = next(p for p in proposals if [c.variable for c in p.candidate.coefficients] == [MU])
+    own = base.unknowns.with_members(unknowns_of(first.candidate, first.shapes, first.held))
+    assert len(_rows(base, own, first)) == 2
+    assert len(_rows(replace(base, vector=base.unknowns.start), own, first)) == 1
 
 
 def test_sizes_end_where_more_of_it_only_does_harm() -> None:

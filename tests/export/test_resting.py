@@ -77,7 +77,9 @@ def exact(k: float, time: np.ndarray, start: np.ndarray) -> np.ndarray:
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("rest")
     (folder / "Rest.mo").write_text(MODEL)
-    return export_fmu(str(folder / "Rest.mo"), output=folder / "Rest.fmu", platforms=(native_platform().fmi3,))
+    return export_fmu(
+        str(folder / "Rest.mo"), output=folder / "Rest.fmu", platforms=(native_platform().fmi3,)
+    )
 
 
 @pytest.mark.slow
@@ -122,3 +124,22 @@ def test_a_state_comes_to_rest_and_moves_again_within_a_run(fmu: Path, tmp_path:
     slave.freeFMUState(saved)
     slave.terminate()
     slave.freeInstance()
+
+
+@pytest.mark.slow
+def test_a_model_may_have_nothing_that_moves_and_implicit_equations(tmp_path: Path):
+    (tmp_path / "Held.mo").write_text(
+        "model Held parameter Real k = 0; Real x(start=1, fixed=true); output Real y(start=1); equation "
+        "der(x) = if k > 0 then -y else 0; y^3 + y = 2*x; end Held;"
+    )
+    fmu = export_fmu(
+        str(tmp_path / "Held.mo"), output=tmp_path / "Held.fmu", platforms=(native_platform().fmi3,)
+    )
+    with Plant.open(fmu) as plant:
+        held = plant.run({"k": 0.0}, Signals(TIME, {}), ("x", "y"), TIME)
+        moved = plant.run({"k": 1.0}, Signals(TIME, {}), ("x", "y"), TIME, tolerance=1e-10)
+    assert np.all(held["x"] == 1.0)
+    np.testing.assert_allclose(held["y"], 1.0, atol=1e-12)
+    # x = (y^3 + y)/2 and x' = -y, so that y' (3 y^2 + 1)/2 = -y: time from y alone
+    y = moved["y"]
+    np.testing.assert_allclose(0.75 * (1 - y**2) - 0.5 * np.log(y), TIME, atol=1e-7)

@@ -186,4 +186,5 @@ def test_a_unit_that_does_not_end_is_given_up_and_its_limit_does_not_reach_the_n
 def test_a_unit_without_a_result_is_missed_even_a_clean_one():
     ended = Discovery("clean-0", "windage", True, "", "", "no-missing-effect", (), None, None, 1.0)
     given_up = replace(ended, verdict=f"{NO_RESULT}: not ended after 600 s")
-    assert ended.found and not given_up.found
+    assert ended.found
+    assert not given_up.found

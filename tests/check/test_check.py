@@ -227,6 +227,28 @@ def test_a_step_that_is_too_long_without_an_error_is_seen(build: Build) -> None:
     assert report.verdict is Verdict.FAILED
 
 
+@pytest.mark.parametrize(
+    ("step", "usable", "verdict"), [(0.08, 0.04, Verdict.WARNING), (1.2, 0.0375, Verdict.FAILED)]
+)
+def test_where_a_step_is_too_long_the_first_shorter_one_that_does_is_named(
+    build: Build, step: float, usable: float, verdict: Verdict
+) -> None:
+    """Forward Euler of exp(-t/tau), tau = 0.5 s, unstable above 1 s: what half a step changes has a closed form."""
+
+    def change(h: float) -> float:
+        n = np.arange(round(12.0 / h) + 1)
+        coarse, fine = (1.0 - h / 0.5) ** n, (1.0 - 0.5 * h / 0.5) ** (2 * n)
+        return float(np.abs(coarse - fine).max() / np.ptp(coarse))
+
+    assert change(2.0 * usable) > numerics.STEP_WARNING > change(usable)
+    report = check_fmu(build("EULER"), excitation=Excitation(step=step, duration=12.0), cycles=2)
+    found = line(report, "communication step")
+    assert found.values["usable_step_s"] == pytest.approx(usable)
+    assert found.text.endswith(f"; halving {usable:g} s changes {change(usable):.1e}: use that step")
+    assert found.verdict is verdict
+    assert (found.values["change"] > numerics.STEP_FAILED) is (verdict is Verdict.FAILED)
+
+
 def test_where_co_simulation_fails_model_exchange_is_tried() -> None:
     report = check_fmu(lag2("NO_STEPS", tool="vendor"), cycles=2)
     assert line(report, "runs").verdict is Verdict.WARNING

@@ -14,6 +14,7 @@ from thsa_cosim.export.emit import number, statements
 from thsa_cosim.export.graph import Graph
 from thsa_cosim.export.implicit import Implicit
 from thsa_cosim.export.model import CausalModel, ModelVariable, column
+from thsa_cosim.export.resting import moving
 from thsa_cosim.export.texts import loop_texts, quoted, short, texts
 
 _KINDS = ("state", "derivative", "input", "parameter", "dependent", "algebraic")
@@ -80,6 +81,7 @@ def config_header(model: CausalModel, model_identifier: str, token: str, toleran
         f"#define N_TEXTS {len(texts(model))}",
         f"#define N_LOOPS {len(loop_texts(model))}",
         f"#define N_PIVOTS {len(model.pivots)}",
+        *(["#define N_RESTING 1"] if _rests(model) else []),
         f"#define N_TIMED {sum(not slope.is_zero() for slope in time_slopes(model))}",
         f"#define DEFAULT_TOLERANCE {tolerance!r}",
     ]
@@ -146,6 +148,8 @@ def model_source(model: CausalModel) -> ModelSource:
     alone = {"dependent": outputs(d=model.dependent), "initial": outputs(x=model.initial)}
     if implicit.size:
         alone["initial"] += [(f"v[{i}]", node) for i, node in enumerate(graph.add_column(model.y_start))]
+    if _rests(model):
+        alone["moving"] = outputs(a=moving(model.rhs, _parameters(model)))
     if events.used:
         alone["discrete_start"] = outputs(z=events.z_start)
     if model.g_start.numel():
@@ -203,6 +207,12 @@ def time_slopes(model: CausalModel) -> list[ca.SX]:
         slope = ca.jacobian(relation, model.time) if moving == {model.time.name()} else ca.SX(0)
         slopes.append(ca.SX(0) if ca.depends_on(slope, model.time) else ca.densify(slope))
     return slopes
+
+
+def _rests(model: CausalModel) -> bool:
+    """Whether parameters can hold a state at rest."""
+    found = moving(model.rhs, _parameters(model))
+    return any(not (found.nz[k].is_constant() and float(found.nz[k])) for k in range(found.numel()))
 
 
 def _parameters(model: CausalModel) -> frozenset[str]:
@@ -273,6 +283,7 @@ def _after_dependent(slow: _Slow, name: str) -> list[str]:
 _ARGUMENTS = {
     "dependent": "const double *p, double *d",
     "initial": _POINT.replace("const double *x, ", "") + ", const double *x_start, double *x",
+    "moving": "const double *p, const double *d, double *a",
     "rhs": f"{_POINT}, double *dx",
     "algebraic": f"{_POINT}, double *w",
     "outputs": f"{_POINT}, double *y",

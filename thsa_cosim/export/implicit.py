@@ -78,7 +78,7 @@ class Implicit:
 
     def begin(self, name: str) -> list[str]:
         """The first statements of a function: bring y, and its derivatives, up to date."""
-        if name in ("dependent", "samples", "first_indicators"):
+        if name in ("dependent", "moving", "samples", "first_indicators"):
             return []
         if name in ("initial", "discrete_start"):
             lines = []

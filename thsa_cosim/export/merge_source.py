@@ -10,7 +10,7 @@ from thsa_cosim.system.order import stages
 
 _FUNCTIONS = (
     "dependent", "initial", "rhs", "algebraic", "outputs", "indicators", "jacobian", "directional", "time_slopes",
-    "p_start", "u_start", "x_start", "x_nominal", "p_tunable", "text", "pivots",
+    "p_start", "u_start", "x_start", "x_nominal", "p_tunable", "text", "pivots", "moving",
 )  # fmt: skip
 _POINT = "double t, const double *x, const double *u, const double *p, const double *d, const double *m"
 

@@ -8,7 +8,7 @@ block WindingSelfHeating "Winding and magnets that the copper loss warms"
   Real E(unit="J", start=0, fixed=true, nominal=10) "Heat that has not been given off";
   Real theta(unit="K") "Temperature above that of the box";
 equation
-  der(E) = (if noEvent(h > 0) then P else 0) - E/tau;
+  der(E) = if h > 0 then P - E/tau else 0;
   theta = h*E;
   g_R = alpha_R*theta;
   g_psi = alpha_psi*theta;

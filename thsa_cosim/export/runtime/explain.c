@@ -96,9 +96,10 @@ Status explain_slowness(Instance *c, const char *why) {
                  explain_relation(often, name, sizeof name));
 #if N_X
     double most = 0.0;
-    for (int n = 0; n < N_X; n++) {
+    for (int k = 0; k < MOVERS(c); k++) {
+        const int n = MOVER(c, k);
         const double size = fmax(fabs(c->s.now.x[n]), fabs(c->x_new[n]));
-        const double scaled = fabs(c->stage[RODAS_STAGES - 1][n]) / (model_x_nominal[n] + size);
+        const double scaled = fabs(c->stage[RODAS_STAGES - 1][k]) / (model_x_nominal[n] + size);
         if (!(scaled <= most)) most = scaled, worst = n; /* what is no number is the worst */
     }
     snprintf(state, sizeof state, "; %s limits the step size", name_of(STATES, worst, name, sizeof name));

@@ -167,11 +167,27 @@ double instance_indicator(const Instance *c, int k) {
     return c->g[k] + (c->s.now.m[k] > 0.5 ? band : -band);
 }
 
+/* Which states the parameters let move. */
+static void update_movers(Instance *c) {
+#if N_RESTING
+    State *s = &c->s;
+    double moves[N_X + 1];
+    model_moving(s->p, s->d, moves);
+    s->movers = 0;
+    for (int k = 0; k < N_X; k++)
+        if (moves[k] != 0.0) s->mover[s->movers++] = k;
+    c->factors_of = -1;
+#else
+    (void)c;
+#endif
+}
+
 static Status update_dependent(Instance *c) {
     State *s = &c->s;
     if (!s->dependent_due) return OK;
     if (N_D + N_CACHE && (model_dependent(s->p, s->d) || !all_finite(s->d, N_D)))
         return fail(c, s->phase <= INITIALIZATION ? FAILED : DISCARD, "a calculated parameter cannot be computed");
+    update_movers(c);
     s->dependent_due = 0;
     instance_changed(c);
     return OK;

@@ -56,7 +56,19 @@ typedef struct {
     int initial_due;         /* initial equations not solved for the present start values */
     int states_jumped;       /* an event has reinitialized states since this was last asked (Model Exchange) */
     int modes_due;           /* inputs or parameters jumped: relations have to be checked (Co-Simulation) */
+#if N_RESTING
+    int movers, mover[N_X + 1]; /* number and indices of the states that the parameters let move */
+#endif
 } State;
+
+/* The solver's vectors hold the moving states alone; the k-th of them is state MOVER(c, k). */
+#if N_RESTING
+#define MOVERS(c) ((c)->s.movers)
+#define MOVER(c, k) ((c)->s.mover[k])
+#else
+#define MOVERS(c) N_X
+#define MOVER(c, k) (k)
+#endif
 
 typedef struct Instance Instance;
 typedef struct Recorder Recorder;
@@ -87,7 +99,7 @@ struct Instance {
     int pivot[N_X + 1], order[N_X + 1];
     double entry[N_X * N_X + 1]; /* of lu beside the diagonal, without zeros: solver.c, compress */
     int from[N_X * N_X + 1], to[N_X * N_X + 1], lower, entries;
-    double stage[RODAS_STAGES][N_X + 1];
+    double stage[RODAS_STAGES][N_X + 1]; /* of the moving states */
     double x_new[N_X + 1];
     long events, steps, rejected;
     unsigned char asserted[N_A + 1]; /* violations are reported once */

@@ -35,6 +35,9 @@
 #ifndef N_TIMED
 #define N_TIMED 0 /* relations of time alone, linear in it: time events */
 #endif
+#ifndef N_RESTING
+#define N_RESTING 0 /* 1: parameters may hold states at rest */
+#endif
 #define N_M (N_G + (N_EVENTS ? 2 * N_Z + N_T + 1 : 0)) /* modes, z, pre(z), ticks, initial */
 
 #if N_X < 0 || N_U < 0 || N_P < 0 || N_D < 0 || N_W < 0 || N_Y > N_W || N_G < 0
@@ -47,6 +50,7 @@ extern const unsigned char model_p_tunable[]; /* 1: may be set while simulating;
 #define MODEL_POINT double t, const double *x, const double *u, const double *p, const double *d, const double *m
 
 int model_dependent(const double *p, double *d);  /* calculated parameters */
+int model_moving(const double *p, const double *d, double *a); /* 0: the state is at rest, its dx is 0 whatever x, u, t are */
 int model_initial(double t, const double *u, const double *p, const double *d, const double *m,
                   const double *x_start, double *x);  /* initial equations for given modes */
 int model_rhs(MODEL_POINT, double *dx);

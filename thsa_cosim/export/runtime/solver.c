@@ -61,27 +61,27 @@ void solver_inputs(const Instance *c, double h, double *u) {
 }
 
 /* LU with partial pivoting, column-major, reciprocals on the diagonal; structural zeros are skipped. */
-static int factorize(double *restrict w, int *restrict pivot) {
-    for (int k = 0; k < N_X; k++) {
-        double *col = w + k * N_X;
+static int factorize(int n_x, double *restrict w, int *restrict pivot) {
+    for (int k = 0; k < n_x; k++) {
+        double *col = w + k * n_x;
         int best = k;
-        for (int i = k + 1; i < N_X; i++)
+        for (int i = k + 1; i < n_x; i++)
             if (fabs(col[i]) > fabs(col[best])) best = i;
         if (!(fabs(col[best]) > 0.0) || !is_finite(col[best])) return 1;
         pivot[k] = best;
         if (best != k)
-            for (int j = 0; j < N_X; j++) {
-                double swap = w[j * N_X + k];
-                w[j * N_X + k] = w[j * N_X + best];
-                w[j * N_X + best] = swap;
+            for (int j = 0; j < n_x; j++) {
+                double swap = w[j * n_x + k];
+                w[j * n_x + k] = w[j * n_x + best];
+                w[j * n_x + best] = swap;
             }
         const double inverse = 1.0 / col[k];
         int below[N_X], n = 0;
         col[k] = inverse;
-        for (int i = k + 1; i < N_X; i++)
+        for (int i = k + 1; i < n_x; i++)
             if (col[i] != 0.0) col[i] *= inverse, below[n++] = i;
-        for (int j = k + 1; n && j < N_X; j++) {
-            double *restrict right = w + j * N_X;
+        for (int j = k + 1; n && j < n_x; j++) {
+            double *restrict right = w + j * n_x;
             const double factor = right[k];
             if (factor == 0.0) continue;
             for (int e = 0; e < n; e++) right[below[e]] -= factor * col[below[e]];
@@ -93,40 +93,51 @@ static int factorize(double *restrict w, int *restrict pivot) {
 /* P W = L D U: the entries of L and U beside the diagonal that are not 0, in the order in which they are used, U's rows over
  * the diagonal D; the swaps as one order. One flat loop over few entries beats nested ones over all. */
 static void compress(Instance *c) {
+    const int n_x = MOVERS(c);
     int n = 0;
-    for (int k = 0; k < N_X; k++) c->order[k] = k;
-    for (int k = 0; k < N_X; k++) {
+    for (int k = 0; k < n_x; k++) c->order[k] = k;
+    for (int k = 0; k < n_x; k++) {
         const int swap = c->order[k];
         c->order[k] = c->order[c->pivot[k]];
         c->order[c->pivot[k]] = swap;
     }
-    for (int k = 0; k < N_X; k++)
-        for (int i = k + 1; i < N_X; i++) {
-            const double value = c->lu[k * N_X + i];
+    for (int k = 0; k < n_x; k++)
+        for (int i = k + 1; i < n_x; i++) {
+            const double value = c->lu[k * n_x + i];
             if (value != 0.0) c->entry[n] = value, c->from[n] = k, c->to[n++] = i;
         }
     c->lower = n;
-    for (int k = N_X - 1; k >= 0; k--)
+    for (int k = n_x - 1; k >= 0; k--)
         for (int i = 0; i < k; i++) {
-            const double value = c->lu[k * N_X + i];
-            if (value != 0.0) c->entry[n] = value * c->lu[i * (N_X + 1)], c->from[n] = k, c->to[n++] = i;
+            const double value = c->lu[k * n_x + i];
+            if (value != 0.0) c->entry[n] = value * c->lu[i * (n_x + 1)], c->from[n] = k, c->to[n++] = i;
         }
     c->entries = n;
 }
 
 static void solve(const Instance *c, double *restrict b) {
+    const int n_x = MOVERS(c);
     double v[N_X];
-    for (int k = 0; k < N_X; k++) v[k] = b[c->order[k]];
+    for (int k = 0; k < n_x; k++) v[k] = b[c->order[k]];
     for (int e = 0; e < c->lower; e++) v[c->to[e]] -= v[c->from[e]] * c->entry[e];
-    for (int k = 0; k < N_X; k++) v[k] *= c->lu[k * (N_X + 1)];
+    for (int k = 0; k < n_x; k++) v[k] *= c->lu[k * (n_x + 1)];
     for (int e = c->lower; e < c->entries; e++) v[c->to[e]] -= v[c->from[e]] * c->entry[e];
-    for (int k = 0; k < N_X; k++) b[k] = v[k];
+    for (int k = 0; k < n_x; k++) b[k] = v[k];
 }
 
 /* By value: terms whose coefficient is 0 may change from 0.0 to -0.0, which is no reason to factorize anew. */
-static int differ(const double *restrict one, const double *restrict other) {
+static int differ(const Instance *c, const double *restrict one, const double *restrict other) {
     int found = 0;
+#if N_RESTING
+    for (int j = 0; j < MOVERS(c); j++)
+        for (int i = 0; i < MOVERS(c); i++) {
+            const int at = MOVER(c, j) * N_X + MOVER(c, i);
+            found |= one[at] != other[at];
+        }
+#else
+    (void)c;
     for (int i = 0; i < N_X * N_X; i++) found |= one[i] != other[i];
+#endif
     return found;
 }
 
@@ -136,7 +147,7 @@ int solver_linearize(Instance *c) {
     if (c->jacobian_valid) return 0;
     const int fresh = 1 - c->current;
     if (model_jacobian(s->now.time, s->now.x, s->now.u, s->p, s->d, s->now.m, c->J[fresh], c->B, c->ft)) return 1;
-    if (differ(c->J[fresh], c->J[c->current])) {
+    if (differ(c, c->J[fresh], c->J[c->current])) {
         if (c->factors_of == fresh) c->factors_of = -1;
         c->current = fresh;
     }
@@ -157,9 +168,25 @@ static double leading_digits(double h) {
     return wide - (wide - h);
 }
 
+/* U = dx of the moving states at their values v. */
+static int rates(const Instance *c, double time, const double *v, const double *u, double *U) {
+    const State *s = &c->s;
+#if N_RESTING
+    double x[N_X], dx[N_X];
+    memcpy(x, s->now.x, sizeof x);
+    for (int n = 0; n < MOVERS(c); n++) x[MOVER(c, n)] = v[n];
+    if (model_rhs(time, x, u, s->p, s->d, s->now.m, dx)) return 1;
+    for (int n = 0; n < MOVERS(c); n++) U[n] = dx[MOVER(c, n)];
+    return 0;
+#else
+    return model_rhs(time, v, u, s->p, s->d, s->now.m, U);
+#endif
+}
+
 double solver_step(Instance *c, double h) {
     const State *s = &c->s;
     const double *restrict x0 = s->now.x;
+    const int n_x = MOVERS(c);
     double argument[N_X], moved[N_U + 1];
     const double per_h = 1.0 / h, rounded = leading_digits(h);
 
@@ -167,10 +194,15 @@ double solver_step(Instance *c, double h) {
     if (c->factors_of != c->current || c->factored_step != rounded) {
         const double shift = 1.0 / (gamma_ * rounded);
         const double *J = c->J[c->current];
+#if N_RESTING
+        for (int j = 0; j < n_x; j++)
+            for (int i = 0; i < n_x; i++) c->lu[j * n_x + i] = -J[MOVER(c, j) * N_X + MOVER(c, i)];
+#else
         for (int i = 0; i < N_X * N_X; i++) c->lu[i] = -J[i];
-        for (int i = 0; i < N_X; i++) c->lu[i * (N_X + 1)] += shift;
+#endif
+        for (int i = 0; i < n_x; i++) c->lu[i * (n_x + 1)] += shift;
         c->factors_of = -1;
-        if (factorize(c->lu, c->pivot)) return -1.0;
+        if (factorize(n_x, c->lu, c->pivot)) return -1.0;
         compress(c);
         c->factors_of = c->current;
         c->factored_step = rounded;
@@ -179,56 +211,73 @@ double solver_step(Instance *c, double h) {
     for (int i = 0; i < STAGES; i++) {
         double *restrict U = c->stage[i];
         if (i == 0) {
-            for (int n = 0; n < N_X; n++) U[n] = c->dx[n];
+            for (int n = 0; n < n_x; n++) U[n] = c->dx[MOVER(c, n)];
         } else {
             if (i < FULL_ROWS) {
-                for (int n = 0; n < N_X; n++) argument[n] = x0[n];
+                for (int n = 0; n < n_x; n++) argument[n] = x0[MOVER(c, n)];
                 for (int j = 0; j < i; j++)
-                    for (int n = 0; n < N_X; n++) argument[n] += a[i][j] * c->stage[j][n];
+                    for (int n = 0; n < n_x; n++) argument[n] += a[i][j] * c->stage[j][n];
             } else {
-                for (int n = 0; n < N_X; n++) argument[n] += c->stage[i - 1][n];
+                for (int n = 0; n < n_x; n++) argument[n] += c->stage[i - 1][n];
             }
             const double *u = s->now.u;
             if (s->inputs_moving) {
                 solver_inputs(c, c_[i] * h, moved);
                 u = moved;
             }
-            if (model_rhs(s->now.time + c_[i] * h, argument, u, s->p, s->d, s->now.m, U)) return -1.0;
+            if (rates(c, s->now.time + c_[i] * h, argument, u, U)) return -1.0;
             for (int j = 0; j < i; j++) {
                 const double factor = C[i][j] * per_h;
-                for (int n = 0; n < N_X; n++) U[n] += factor * c->stage[j][n];
+                for (int n = 0; n < n_x; n++) U[n] += factor * c->stage[j][n];
             }
         }
         if (d_[i] != 0.0)
-            for (int n = 0; n < N_X; n++) U[n] += d_[i] * h * c->ft[n];
+            for (int n = 0; n < n_x; n++) U[n] += d_[i] * h * c->ft[MOVER(c, n)];
         solve(c, U);
     }
 
     const double tolerance = solver_tolerance(c);
     const double *error = c->stage[STAGES - 1];
     double worst = 0.0, finite = 0.0;
-    for (int n = 0; n < N_X; n++) {
-        c->x_new[n] = argument[n] + error[n];
-        const double size = fmax(fabs(x0[n]), fabs(c->x_new[n]));
-        const double scaled = fabs(error[n]) / (tolerance * (model_x_nominal[n] + size));
+#if N_RESTING
+    memcpy(c->x_new, x0, sizeof(double) * N_X);
+#endif
+    for (int n = 0; n < n_x; n++) {
+        const int at = MOVER(c, n);
+        c->x_new[at] = argument[n] + error[n];
+        const double size = fmax(fabs(x0[at]), fabs(c->x_new[at]));
+        const double scaled = fabs(error[n]) / (tolerance * (model_x_nominal[at] + size));
         worst = scaled > worst ? scaled : worst;
-        finite += c->x_new[n] - c->x_new[n];
+        finite += c->x_new[at] - c->x_new[at];
     }
     return finite == 0.0 ? worst : -1.0;
 }
 
+/* The states at rest stay where they are. */
+static void at_rest(const Instance *c, double *x) {
+#if N_RESTING
+    memcpy(x, c->s.now.x, sizeof(double) * N_X);
+#else
+    (void)c, (void)x;
+#endif
+}
+
 void solver_dense_middle(const Instance *c, double *x) {
-    for (int n = 0; n < N_X; n++) x[n] = 0.5 * (c->s.now.x[n] + c->x_new[n]);
+    at_rest(c, x);
+    for (int k = 0; k < MOVERS(c); k++) {
+        const int n = MOVER(c, k);
+        x[n] = 0.5 * (c->s.now.x[n] + c->x_new[n]);
+    }
     for (int j = 0; j < STAGES; j++) {
         const double weight = 0.25 * (H[0][j] + 0.5 * (H[1][j] + 0.5 * H[2][j]));
-        for (int n = 0; n < N_X; n++) x[n] += weight * c->stage[j][n];
+        for (int k = 0; k < MOVERS(c); k++) x[MOVER(c, k)] += weight * c->stage[j][k];
     }
 }
 
 void solver_dense_prepare(Instance *c) {
     if (c->dense_ready) return;
     c->dense_ready = 1;
-    for (int n = 0; n < N_X; n++) {
+    for (int n = 0; n < MOVERS(c); n++) {
         double k[3] = {0.0, 0.0, 0.0};
         for (int j = 0; j < STAGES; j++)
             for (int r = 0; r < 3; r++) k[r] += H[r][j] * c->stage[j][n];
@@ -238,8 +287,10 @@ void solver_dense_prepare(Instance *c) {
 
 void solver_dense(const Instance *c, double theta, double *x) {
     const double rest = 1.0 - theta;
-    for (int n = 0; n < N_X; n++) {
-        const double bend = c->stage[0][n] + theta * (c->stage[1][n] + theta * c->stage[2][n]);
+    at_rest(c, x);
+    for (int k = 0; k < MOVERS(c); k++) {
+        const int n = MOVER(c, k);
+        const double bend = c->stage[0][k] + theta * (c->stage[1][k] + theta * c->stage[2][k]);
         x[n] = rest * c->s.now.x[n] + theta * (c->x_new[n] + rest * bend);
     }
 }

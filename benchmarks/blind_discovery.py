@@ -1,13 +1,15 @@
 """Leave-one-out discovery: is the law of an effect found once the catalogue does not know it?
 
     python benchmarks/blind_discovery.py -o DIR [--effect NAME]... [--units 1] [--clean 0] [--seed 1] [--jobs 1]
+                                         [--limit 600]
 
 For each effect of the blind benchmark (or those named) so many units with it alone, of medium and strong size in turn;
 each is diagnosed with the effect removed from the catalogue, with ``empirical = true``. Whatever the extended model has
 at the effect's place by then, terms of an empirical law or other effects, is the law that was found. It is compared
 with the true one over the held-out recordings: deviation (root mean squares, and largest values) over the size of the
 true law, less what the declared parameters of the place can take up of either. Clean units are diagnosed likewise, each
-without one effect: nothing is to be invented there. What has been run is kept in DIR.
+without one effect: nothing is to be invented there. What has been run is kept in DIR. A unit whose
+diagnosis has not ended after the limit is given up and counted as missed, a clean one, too: it has no result.
 
 Where effects that are left, at another place, explain the held-out recordings to the noise (an offset of the current
 sensor as asymmetric friction), the recordings hold no trace of the removed law and none can be found: such a unit is
@@ -20,12 +22,15 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
+import signal
 import time
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -50,6 +55,27 @@ from thsa_cosim.scenario import Executor, Scenario
 ROOT = Path(__file__).resolve().parents[1]
 WITHIN = 0.05
 SIZES = ("medium", "strong")
+NO_RESULT = "no result"
+
+
+class OutOfTime(BaseException):
+    """A unit's limit is over; no Exception, so that nothing on the way takes it for a failed run."""
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """Raises OutOfTime in the block once it has taken so long; in the main thread of a process only."""
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise OutOfTime
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 @dataclass(frozen=True)
@@ -89,7 +115,9 @@ class Discovery:
     @property
     def found(self) -> bool:
         """Whether the law is within the goal; on a clean unit whether nothing was invented."""
-        return not self.law if self.clean else self.rms is not None and self.rms <= WITHIN
+        if self.clean:
+            return not self.law and not self.verdict.startswith(NO_RESULT)
+        return self.rms is not None and self.rms <= WITHIN
 
     @property
     def everywhere(self) -> bool:
@@ -111,7 +139,7 @@ def plan(effects: Sequence[str], units: int, clean: int, seed: int) -> list[Unit
     return found
 
 
-def run(unit: Unit, folder: Path, scenario: Path) -> Discovery:
+def run(unit: Unit, folder: Path, scenario: Path, limit: float) -> Discovery:
     """Make the unit, diagnose it without its effect, compare the laws; each only where that has not been done."""
     kept = folder / f"{unit.name}.json"
     if kept.exists():
@@ -126,11 +154,14 @@ def run(unit: Unit, folder: Path, scenario: Path) -> Discovery:
     asked = ask(
         "diagnose", without(unit.removed, scenario), **files, folder=folder / unit.name / "study", workers=1
     )
-    found = Discovery(unit.name, unit.removed, unit.clean, "", "", "no result", (), None, None, 0.0)
+    found = Discovery(unit.name, unit.removed, unit.clean, "", "", NO_RESULT, (), None, None, 0.0)
     try:
-        result = conduct(asked, quiet=True).result
+        with limited(limit):
+            result = conduct(asked, quiet=True).result
     except ThsaCosimError as error:
-        found = replace(found, verdict=f"no result: {error}")
+        found = replace(found, verdict=f"{NO_RESULT}: {error}")
+    except OutOfTime:
+        found = replace(found, verdict=f"{NO_RESULT}: not ended after {limit:.0f} s")
     else:
         found = compared(found, label, asked.scenario, result)
         written = json.loads((folder / unit.name / "study" / "result.json").read_text())
@@ -255,6 +286,9 @@ def main() -> None:
     parser.add_argument("--clean", type=int, default=0, help="clean units")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1, help="units at a time")
+    parser.add_argument(
+        "--limit", type=float, default=600.0, help="seconds (wall clock) for a unit's diagnosis"
+    )
     parser.add_argument("--scenario", type=Path, default=ROOT / "scenarios" / "driven.toml")
     options = parser.parse_args()
     folder = options.output.resolve()
@@ -262,7 +296,9 @@ def main() -> None:
     units = plan(options.effect or list(CATALOGUE), options.units, options.clean, options.seed)
     found: list[Discovery] = []
     with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
-        waiting = [pool.submit(run, unit, folder, options.scenario.resolve()) for unit in units]
+        waiting = [
+            pool.submit(run, unit, folder, options.scenario.resolve(), options.limit) for unit in units
+        ]
         for ended in waiting:
             found.append(ended.result())
             print(summary(found[-1:]).splitlines()[1], flush=True)

@@ -1,6 +1,7 @@
 """The scoring of leave-one-out discovery: a law that is the true one, one that is off, one in the wrong place."""
 
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 sys.path.append(str(BENCHMARKS))
-from blind_discovery import Discovery, plan, summary, without
+from blind_discovery import NO_RESULT, Discovery, OutOfTime, limited, plan, summary, without
 from blind_effects import CATALOGUE
 from blind_laws import PLACES, SLOTS, joined, law_at, place_of
 from blind_plant import Undeclared, declared
@@ -172,3 +173,18 @@ def test_units_are_planned_in_rounds_and_a_seed_belongs_to_one():
     assert units[-1].clean
     alone = plan(["spring"], units=1, clean=0, seed=3)
     assert alone[0].seed == units[1].seed, "a unit does not depend on which others are asked for"
+
+
+def test_a_unit_that_does_not_end_is_given_up_and_its_limit_does_not_reach_the_next_one():
+    with pytest.raises(OutOfTime), limited(0.05):
+        time.sleep(5.0)
+    with limited(0.05):
+        pass
+    time.sleep(0.1)  # a timer left running would end the test here
+
+
+def test_a_unit_without_a_result_is_missed_even_a_clean_one():
+    ended = Discovery("clean-0", "windage", True, "", "", "no-missing-effect", (), None, None, 1.0)
+    given_up = replace(ended, verdict=f"{NO_RESULT}: not ended after 600 s")
+    assert ended.found
+    assert not given_up.found

@@ -14,7 +14,7 @@ from pathlib import Path
 from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Variant
-from thsa_cosim.diagnosis.catalogue.effects.inverter_dead_time import PAIRS
+from thsa_cosim.diagnosis.catalogue.effects.inverter_dead_time import PERIODS
 from thsa_cosim.diagnosis.catalogue.extend import (
     EMPIRICAL_NAME,
     export_kept,
@@ -68,9 +68,7 @@ _TAKEN_UP = EffectParameter(
     "s_0", "1", 0.5, "share taken up at the start", "shape", 0.0, 1.0, starts=(0.0, 1.0)
 )
 _SIGN = _shape("i_s", "I", "current over which the sign turns", (0.01, 0.05))
-_ELECTRICAL = EffectParameter(
-    "n", "1", 6.0, "periods per revolution", "shape", 1.0, 144.0, starts=tuple(6.0 * pairs for pairs in PAIRS)
-)
+_ELECTRICAL = replace(PERIODS, lower=1.0)
 _FADING = EffectParameter(
     "T_f", "s", 10.0, "time over which E fades", role="shape", lower=0.5, upper=1e5, starts=(5.0, 100.0)
 )

@@ -17,10 +17,10 @@ from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Varia
 from thsa_cosim.diagnosis.catalogue.effects.inverter_dead_time import PERIODS
 from thsa_cosim.diagnosis.catalogue.extend import (
     EMPIRICAL_NAME,
+    export_kept,
     extended_class,
     qualified,
     source_beside,
-    write_extended,
 )
 from thsa_cosim.diagnosis.catalogue.slots import find_slots
 from thsa_cosim.diagnosis.catalogue.superset import scales_of, slot_signals
@@ -36,10 +36,7 @@ from thsa_cosim.diagnosis.fitting.identified import Identified
 from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import EmpiricalLaw, EmpiricalTerm, Value
-from thsa_cosim.export import export_fmu
-from thsa_cosim.export.compile import native_platform
 from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
-from thsa_cosim.study import export_digest, is_made_from, note_made_from
 
 #: At most so many terms: a law of more says no more than a plot.
 _TERMS = 3
@@ -208,12 +205,7 @@ class LawSearch:
         terms = candidates_of(EMPIRICAL, slots, {})
         beside = source_beside(self.spec.model, self.spec.package)
         source = extended_class(name, base, [*own, *terms], shapes, beside=beside)
-        fmu, platforms = self.folder / f"{name}.fmu", (native_platform().fmi3,)
-        made_from = export_digest(source, self.spec.package, platforms)
-        if not is_made_from(fmu, made_from):
-            file = write_extended(self.folder, name, source)
-            export_fmu(str(file), package=self.spec.package, output=fmu, platforms=platforms)
-            note_made_from(fmu, made_from)
+        fmu = export_kept(self.folder, name, source, self.spec.package)
         trials = with_fmu(self.trials, fmu)
         cases = [t.case for t in trials if t.part == "fit"]
         opening = partial(self.open_runner, simulation)

@@ -227,6 +227,29 @@ def test_a_step_that_is_too_long_without_an_error_is_seen(build: Build) -> None:
     assert report.verdict is Verdict.FAILED
 
 
+def test_where_a_step_is_too_long_shorter_ones_are_tried(build: Build) -> None:
+    """Forward Euler of exp(-t/tau), tau = 0.5 s, unstable above 1 s: what half a step changes has a closed form."""
+
+    def change(h: float) -> float:
+        n = np.arange(round(12.0 / h) + 1)
+        coarse, fine = (1.0 - h / 0.5) ** n, (1.0 - 0.5 * h / 0.5) ** (2 * n)
+        return float(np.abs(coarse - fine).max() / np.ptp(coarse))
+
+    def found(step: float) -> Finding:
+        report = check_fmu(build("EULER"), excitation=Excitation(step=step, duration=12.0), cycles=2)
+        return line(report, "communication step")
+
+    assert change(0.08) > numerics.STEP_WARNING > change(0.04)
+    usable = found(0.08)
+    assert usable.verdict is Verdict.WARNING
+    assert usable.text.endswith(f"; halving 0.04 s changes {change(0.04):.1e}: use that step")
+    assert usable.values["usable_step_s"] == pytest.approx(0.04)
+    assert change(1.2 / 16) > numerics.STEP_WARNING, "the shortest one tried"
+    unstable = found(1.2)
+    assert unstable.verdict is Verdict.FAILED
+    assert unstable.text.endswith(f"halving 0.075 s still changes {change(0.075):.1e}: use a shorter one")
+
+
 def test_where_co_simulation_fails_model_exchange_is_tried() -> None:
     report = check_fmu(lag2("NO_STEPS", tool="vendor"), cycles=2)
     assert line(report, "runs").verdict is Verdict.WARNING

@@ -5,38 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from fmu_sources import build
 
-from tests.fmu.test_plant import lag
+from identify.lag import TAU, lag_scenario
 
-SCENARIO = """
-kind = "identify"
-fmu = "{fmu}"
-seed = 1
-
-[recordings]
-fit = ["run.csv"]
-time = {{ column = "t", unit = "s" }}
-
-[recordings.columns]
-u = {{ column = "u", unit = "m/s" }}
-y = {{ column = "y", unit = "m/s" }}
-
-[cost]
-error = "squared"
-
-[cost.channels.y]
-noise = 1e-3
-
-[[parameters]]
-name = "tau"
-variable = "tau"
-lower = 0.05
-upper = 0.5
-unit = "s"
-
+FURTHER = """
 [[parameters]]
 name = "at"
 variable = "at"
@@ -54,19 +28,14 @@ generations = 12
 def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
     """The study's folder, and the lines that the command wrote to the terminal while it ran."""
     folder = tmp_path_factory.mktemp("foreign")
-    time = np.linspace(0.0, 2.0, 401)
-    u = np.interp(time, [0.0, 0.2, 0.5, 1.1, 1.5, 2.0], [0.0, 1.0, 1.0, -0.5, 0.2, 0.2])
-    y = lag(time, u, 0.2, 1.0) + 1e-3 * np.random.default_rng(0).standard_normal(401)
-    table = np.column_stack([time, u, y])
-    np.savetxt(folder / "run.csv", table, delimiter=",", header="t,u,y", comments="", fmt="%.9g")
     fmu = build.lag2("WRONG_SLOPE", "RESET_IN_SETUP", tool="vendor")
-    (folder / "s.toml").write_text(SCENARIO.format(fmu=fmu))
+    scenario = lag_scenario(folder, fmu, noise=1e-3, further=FURTHER)
     command = [
         sys.executable,
         "-m",
         "thsa_cosim",
         "identify",
-        str(folder / "s.toml"),
+        str(scenario),
         "-o",
         str(folder / "out"),
     ]
@@ -84,7 +53,7 @@ def result(study: tuple[Path, list[str]]) -> dict[str, object]:
 def test_values_are_right_within_their_stated_errors(result: dict[str, object]) -> None:
     tau = result["points"][0]["parameters"]["tau"]  # type: ignore[index]
     assert tau["identifiable"]
-    assert abs(tau["value"] - 0.2) < 3.0 * tau["stderr"]
+    assert abs(tau["value"] - TAU) < 3.0 * tau["stderr"]
     assert tau["stderr"] < 1e-3
 
 

@@ -8,35 +8,11 @@ import numpy as np
 import pytest
 from fmu_sources import build
 
-from tests.fmu.test_plant import lag
+from identify.lag import TAU, lag_scenario
 from thsa_cosim import cli
 
-TAU, NOISE = 0.2, 0.01
-SCENARIO = """
-kind = "identify"
-fmu = "{fmu}"
-
-[recordings]
-fit = ["run.csv"]
-time = {{ column = "t", unit = "s" }}
-
-[recordings.columns]
-u = {{ column = "u", unit = "m/s" }}
-y = {{ column = "y", unit = "m/s" }}
-
-[cost]
-error = "squared"
-
-[cost.channels.y]
-noise = 0.01
-
-[[parameters]]
-name = "tau"
-variable = "tau"
-lower = 0.05
-upper = 0.5
-unit = "s"
-
+NOISE = 0.01
+GAIN = """
 [[parameters]]
 name = "gain"
 variable = "gain"
@@ -48,13 +24,8 @@ unit = "1"
 
 def identified(fmu: Path, folder: Path) -> dict[str, Any]:
     """``result.json`` of the exact answer of a lag, with noise, that ``fmu`` is fitted to."""
-    time = np.linspace(0.0, 2.0, 401)
-    u = np.interp(time, [0.0, 0.2, 0.5, 1.1, 1.5, 2.0], [0.0, 1.0, 1.0, -0.5, 0.2, 0.2])
-    y = lag(time, u, TAU, 1.0) + NOISE * np.random.default_rng(0).standard_normal(401)
-    table = np.column_stack([time, u, y])
-    np.savetxt(folder / "run.csv", table, delimiter=",", header="t,u,y", comments="", fmt="%.9g")
-    (folder / "s.toml").write_text(SCENARIO.format(fmu=fmu))
-    assert cli.run_command(["identify", str(folder / "s.toml"), "-o", str(folder / "out")]) == 0
+    scenario = lag_scenario(folder, fmu, noise=NOISE, further=GAIN)
+    assert cli.run_command(["identify", str(scenario), "-o", str(folder / "out")]) == 0
     found: dict[str, Any] = json.loads((folder / "out" / "result.json").read_text())
     return found
 

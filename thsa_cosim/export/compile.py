@@ -19,6 +19,7 @@ from pathlib import Path
 from platform import machine as machine_name
 
 from thsa_cosim.errors import MissingExtraError, ThsaCosimError
+from thsa_cosim.export.cache import cache_folder, keep
 from thsa_cosim.fmu.sources import host_compiler
 
 
@@ -94,7 +95,7 @@ def compile_library(folder: Path, sources: Sequence[str], platform: Platform, ou
         )
         raise ThsaCosimError(f"The C compiler failed for {platform.target}: {lines[0]}")
     if kept is not None:
-        _keep(output, kept)
+        keep(output, kept, KEPT)
 
 
 def _kept(folder: Path, options: Sequence[str], suffix: str) -> Path | None:
@@ -102,26 +103,8 @@ def _kept(folder: Path, options: Sequence[str], suffix: str) -> Path | None:
     digest = hashlib.sha256("\0".join(options).encode())
     for file in sorted(folder.glob("*.[ch]")):
         digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
-    root = os.environ.get("THSA_COSIM_CACHE")
-    if root is None:
-        home = os.environ.get("LOCALAPPDATA" if sys.platform == "win32" else "XDG_CACHE_HOME")
-        try:
-            root = str((Path(home) if home else Path.home() / ".cache") / "thsa-cosim")
-        except RuntimeError:  # no home
-            return None
-    return Path(root) / "libraries" / f"{digest.hexdigest()}{suffix}" if root else None
-
-
-def _keep(library: Path, kept: Path) -> None:
-    """Keep a library, whole or not at all, and forget the oldest ones; a cache that cannot be written is none."""
-    with contextlib.suppress(OSError):
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        partial = kept.with_name(f"{kept.name}.{os.getpid()}.part")
-        shutil.copyfile(library, partial)
-        partial.replace(kept)
-        known = sorted(kept.parent.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
-        for path in known[KEPT:]:
-            path.unlink(missing_ok=True)
+    cache = cache_folder("libraries")
+    return cache / f"{digest.hexdigest()}{suffix}" if cache else None
 
 
 def available_platforms() -> tuple[Platform, ...]:
@@ -137,6 +120,14 @@ def _compiler(platform: Platform) -> tuple[list[str], str]:
     if own is None:
         raise MissingExtraError(f"Compiling an FMU for {platform.fmi3}", "export")
     return [own], _version(own)
+
+
+def compiler_version() -> str | None:
+    """Version of what compiles for this machine; None where nothing does."""
+    try:
+        return _compiler(native_platform())[1]
+    except ThsaCosimError:
+        return None
 
 
 def ziglang_version() -> str | None:

@@ -27,7 +27,7 @@ from thsa_cosim.study.comparison import (
 from thsa_cosim.study.coupling import CouplingError, coupling_error
 from thsa_cosim.study.digest import digest_of_file, digest_of_folder, digest_of_recording, digest_of_text
 from thsa_cosim.study.engine import Engine, Problem, Reply, Request, Want, stacked
-from thsa_cosim.study.exported import export_digest, is_made_from, note_made_from
+from thsa_cosim.study.exported import export_digest, is_made_from, keep, note_made_from, take_kept
 from thsa_cosim.study.folder import MARKER, claim_folder, describe
 from thsa_cosim.study.identity import shown_words, stages_identity, study_identity
 from thsa_cosim.study.interleave import interleave
@@ -64,6 +64,7 @@ __all__ = [
     "export_digest",
     "interleave",
     "is_made_from",
+    "keep",
     "note_made_from",
     "reached",
     "shown_words",
@@ -71,4 +72,5 @@ __all__ = [
     "stages_identity",
     "study_identity",
     "summarise",
+    "take_kept",
 ]

@@ -1,4 +1,7 @@
-"""The superset that a study keeps: exported anew once anything that it is made from has changed, and only then."""
+"""The superset that a study keeps, and leaves to others: exported anew once anything that it is made from has changed.
+
+Only then: neither for a study that goes on nor for another study of the same user.
+"""
 
 import shutil
 from collections.abc import Callable
@@ -7,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thsa_cosim.diagnosis.catalogue import superset
+from thsa_cosim.diagnosis.catalogue import extend, superset
 from thsa_cosim.diagnosis.catalogue.known import known_effects
-from thsa_cosim.diagnosis.catalogue.superset import SizesReducer, build_superset
+from thsa_cosim.diagnosis.catalogue.superset import build_superset
 from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import Signals
 
@@ -41,24 +44,51 @@ CHANGES: dict[str, tuple[int, Callable[[Path, Path], None]]] = {
 }
 
 
-@pytest.mark.parametrize("change", CHANGES)
-def test_the_superset_is_exported_anew_for_what_it_is_made_from(
-    change: str, package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    exported = []
+@pytest.fixture
+def exported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
+    """What an exporter that writes no real FMU was called for, with an empty cache of the user's."""
+    models: list[str] = []
 
-    def fake(model: str, *, output: Path, **_: object) -> Path:
-        exported.append(model)
+    def export(model: str, *, output: Path, **_: object) -> Path:
+        models.append(model)
         output.write_bytes(b"an FMU")
         return output
 
-    monkeypatch.setattr(superset, "export_fmu", fake)
+    monkeypatch.setattr(extend, "export_fmu", export)
+    monkeypatch.setenv("THSA_COSIM_CACHE", str(tmp_path / "cache"))
+    monkeypatch.delenv("MODELICAPATH", raising=False)
+    return models
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_the_superset_is_exported_anew_for_what_it_is_made_from(
+    change: str, exported: list[str], package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("THSA_COSIM_CACHE", "")
     effects = [known_effects()["windage"]]
     times, touch = CHANGES[change]
     fmu, *_ = build_superset("Actuator", package, effects, tmp_path / "kept")
     touch(package, fmu)
     build_superset("Actuator", package, effects, tmp_path / "kept")
     assert len(exported) == times
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_another_study_exports_only_what_no_study_has_exported(
+    change: str, exported: list[str], package: Path, tmp_path: Path
+) -> None:
+    effects = [known_effects()["windage"]]
+    times, touch = CHANGES[change]
+    first, *_ = build_superset("Actuator", package, effects, tmp_path / "first")
+    touch(package, first)
+    second, *_ = build_superset("Actuator", package, effects, tmp_path / "second")
+    assert len(exported) == (
+        1 if change.endswith("FMU") else times
+    )  # the first study's own copy may be damaged
+    assert second.read_bytes() == b"an FMU"
+    assert {path.name for path in second.parent.iterdir()} == {
+        f"{second.stem}{ending}" for ending in (".fmu", ".mo", ".made-from.json")
+    }
 
 
 @pytest.mark.slow
@@ -80,12 +110,3 @@ def test_an_edited_effect_acts_as_it_now_says(package: Path, tmp_path: Path) -> 
     (right,) = [line for line in text.splitlines() if line.strip().startswith("F =")]
     edit(package / WINDAGE, right, right.replace("then b_q", "then 2*b_q"))
     assert not np.allclose(speed(), before, rtol=1e-6, atol=0.0)
-
-
-def test_sizes_of_signals_in_closed_form() -> None:
-    time = np.linspace(0.0, 2.0, 2001)
-    signals = Signals(time, {"z": 3.0 * np.sin(2.0 * np.pi * time), "F": np.full(time.size, -2.0)})
-    largest, squares, count, travel = SizesReducer(("z", "F"))(signals).reshape(-1, 4).T
-    np.testing.assert_allclose(largest, [3.0, 2.0])
-    np.testing.assert_allclose(squares / count, [4.5 * 2000 / 2001, 4.0])
-    np.testing.assert_allclose(travel, [24.0, 0.0])

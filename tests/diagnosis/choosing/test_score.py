@@ -12,9 +12,11 @@ from thsa_cosim.diagnosis.choosing import score as room
 from thsa_cosim.diagnosis.choosing.score import (
     ENOUGH,
     Scored,
+    extended_unknowns,
     fixed_shapes,
     go_on,
     polish,
+    refit,
     score,
 )
 from thsa_cosim.diagnosis.choosing.screen import Proposal
@@ -122,6 +124,12 @@ def test_going_on_keeps_the_declared_columns_and_stops_where_it_converged(
     assert more["jacobian"] is choice.fit.jacobian
     assert more["steps"] is choice.fit.steps
     assert (more["fresh"], more["iterations"], more["enough"]) == ([1], 4, 3.0)
+    columns = np.ones((SAMPLES, 1))
+    shared = replace(choice, fit=choice.fit.sharing(columns))
+    fits.queue = [fit(2.2, 1.0, 100.0)]
+    again = go_on(bench, shared, declared, HELD).fit
+    assert again.shared is columns, "one copy for all fits"
+    np.testing.assert_array_equal(again.jacobian, np.ones((SAMPLES, 2)))
     done = scored(fit(2.0, 3.0, 300.0, converged=True))
     assert go_on(bench, done, declared, HELD) is done
     fits.queue = [None]
@@ -129,6 +137,29 @@ def test_going_on_keeps_the_declared_columns_and_stops_where_it_converged(
     monkeypatch.setattr(room, "_scored", lambda *given: None)
     fits.queue = [fit(2.2, 1.0, 100.0)]
     assert go_on(bench, choice, declared, HELD) is choice
+
+
+def test_a_fit_from_another_start_has_every_column_fresh_and_no_score_if_it_fails(fits: Any):
+    choice, bench = scored(fit(2.0, 3.0, 300.0)), object()
+    start = np.array([1.5, 8.0])
+    given: Any = (bench, choice.proposal, choice.fit, HELD, choice.fit.unknowns, start)
+    fits.queue = [fit(2.2, 1.0, 100.0), None]
+    found = refit(*given)
+    assert found is not None
+    assert (found.fit.vector[0], found.proposal) == (2.2, choice.proposal)
+    assert refit(*given) is None
+    assert fits.asked == [((bench, choice.fit.unknowns, start), {"enough": 3.0})] * 2
+
+
+def test_what_is_known_of_an_accepted_effects_shapes_stays_known_in_the_next_round():
+    candidate = next(c for c in candidates("stribeck") if c.shapes)
+    starts = {p.name: p.at_start for p in candidate.shapes}
+    held, free = (p for p in candidate.shapes[:2])
+    one = replace(proposed(0.1), candidate=candidate, shapes=starts, held=frozenset({held.name}))
+    accepted: Any = [SimpleNamespace(candidate=candidate, proposal=one)]
+    spreads = {u.name: u.spread for u in extended_unknowns(unknowns(), accepted).members}
+    assert 0.0 < spreads[held.variable] < 1e-3 * starts[held.name]
+    assert np.isinf(spreads[free.variable])
 
 
 WINDAGE = {"motorEffect.windage.b_q": 2e-3}

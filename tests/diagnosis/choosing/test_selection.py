@@ -112,7 +112,9 @@ def selection(monkeypatch: pytest.MonkeyPatch) -> Selection:
     monkeypatch.setattr(room, "polish", lambda bench, one, current, held: one)
     monkeypatch.setattr(room, "go_on", lambda bench, one, current, held: one)
     roles = {"fit": TRIALS, "validate": TRIALS}
-    bench: Any = SimpleNamespace(of=roles.__getitem__, factors=lambda _: np.ones(N), level=lambda _: 1.0)
+    bench: Any = SimpleNamespace(
+        of=roles.__getitem__, factors={"fit": np.ones(N)}.__getitem__, level=lambda _: 1.0
+    )
     weights: Any = SimpleNamespace(base_held=HELD, plain=lambda residual, part: residual, left=lambda _: 1.0)
     current: Any = SimpleNamespace(residual=HELD)
     return Selection(bench, weights, current, HELD)
@@ -369,7 +371,7 @@ def test_what_a_fit_shows_is_seen_beside_the_noise_as_it_was_before_weighing(
     selection: Selection, monkeypatch: pytest.MonkeyPatch
 ):
     weight = 0.2
-    monkeypatch.setattr(selection.bench, "factors", lambda _: np.full(N, weight))
+    monkeypatch.setattr(selection.bench, "factors", {"fit": np.full(N, weight)}.__getitem__)
     selection.current.residual = weight * HELD
     one, other = (
         left_in_the_fit(scored(n, 0.0), weight * (left * SMOOTH + NOISE))

@@ -42,6 +42,9 @@ def test_a_load_that_is_lost_several_times_over_is_found_from_its_size(mu: float
     found = at_sizes(own, base, held, proposals)
     best = max(found, key=lambda s: s.held_out_gain)
     assert len(found) <= FITTED
+    assert not {id(s.proposal) for s in found} & {id(p) for p in proposals}, (
+        "a fit of its own beside the usual one"
+    )
     assert best.candidate.effect.name == "load-dependent-friction"
     value = best.fit.unknowns.named(best.fit.vector)
     assert value[MU if MU in value else MU.replace("motor", "gear")] == pytest.approx(mu, rel=0.05)

@@ -27,6 +27,7 @@ def test_points_fill_the_range_by_its_logarithm_where_it_is_positive() -> None:
     points = points_around(candidate, {"v_S": 1.0, "z": 1.0, "n": 7.0}, 1.0, 32)
     assert len(points) == 32
     assert {p["n"] for p in points} == {7.0}, "what is no free shape stays"
+    assert points == points_around(candidate, {"v_S": 1.0, "z": 1.0, "n": 7.0}, 1.0, 32), "no chance in them"
     speeds, places = np.array([p["v_S"] for p in points]), np.array([p["z"] for p in points])
     assert np.histogram(np.log10(speeds), bins=4, range=(-2.0, 2.0))[0].min() >= 7
     assert np.histogram(places, bins=4, range=(-2.0, 4.0))[0].min() >= 7

@@ -15,6 +15,7 @@ from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export import export_fmu
 from thsa_cosim.export.compile import native_platform
 from thsa_cosim.export.flatten import locate
+from thsa_cosim.study import export_digest, is_made_from, keep, note_made_from, take_kept
 
 #: Extended models are named after their own class; the system model of the shipped package goes by the package's name.
 KNOWN_AS = {"THSA.Actuator": "THSA"}
@@ -80,6 +81,23 @@ def write_extended(folder: Path, name: str, source: str) -> Path:
     path = folder / f"{name}.mo"
     path.write_text(source, encoding="utf-8")
     return path
+
+
+def export_kept(folder: Path, name: str, source: str, package: Path) -> Path:
+    """Have the class ``name`` of ``source`` in ``folder`` as ``.mo`` and ``.fmu``, for this machine; the ``.fmu``.
+
+    It is exported anew once anything that it is made from has changed; until then the study keeps it, and the user's
+    cache for other studies.
+    """
+    fmu, platforms = folder / f"{name}.fmu", (native_platform().fmi3,)
+    made_from = export_digest(source, package, platforms)
+    if not is_made_from(fmu, made_from):
+        file = write_extended(folder, name, source)
+        if not take_kept(fmu, made_from):
+            export_fmu(str(file), package=package, output=fmu, platforms=platforms)
+            keep(fmu, made_from)
+        note_made_from(fmu, made_from)
+    return fmu
 
 
 def write_extended_model(

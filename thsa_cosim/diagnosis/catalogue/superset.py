@@ -10,17 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Runner, Status
+from thsa_cosim.costs.sizes import SizesReducer
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate, candidates_of
 from thsa_cosim.diagnosis.catalogue.effect import Effect
-from thsa_cosim.diagnosis.catalogue.extend import extended_class, qualified, source_beside, write_extended
+from thsa_cosim.diagnosis.catalogue.extend import export_kept, extended_class, qualified, source_beside
 from thsa_cosim.diagnosis.catalogue.slots import SCALES, Slot, find_slots
 from thsa_cosim.errors import StudyError
-from thsa_cosim.export import export_fmu
-from thsa_cosim.export.compile import native_platform
 from thsa_cosim.fmu import read_description
 from thsa_cosim.scenario import Opening, Scenario
-from thsa_cosim.signals import FloatArray, Signals
-from thsa_cosim.study import Case, export_digest, is_made_from, note_made_from
+from thsa_cosim.signals import Signals
+from thsa_cosim.study import Case
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,14 +67,7 @@ def build_superset(
     name = base.replace(".", "_") + "_superset"
     beside = source_beside(model, package)
     source = extended_class(name, base, candidates, description="All effects, neutral", beside=beside)
-    fmu = folder / f"{name}.fmu"
-    platforms = (native_platform().fmi3,)
-    made_from = export_digest(source, package, platforms)
-    if not is_made_from(fmu, made_from):
-        file = write_extended(folder, name, source)
-        export_fmu(str(file), package=package, output=fmu, platforms=platforms)
-        note_made_from(fmu, made_from)
-    return fmu, slots, effects
+    return export_kept(folder, name, source, package), slots, effects
 
 
 def scales_of(
@@ -116,24 +108,6 @@ def scales_of(
         own["W"] = 1.0 if angular else 2.0 * np.pi / own.get("Z", 1.0)
         scales[slot.name] = own
     return scales
-
-
-@dataclass(frozen=True)
-class SizesReducer:
-    """Signals → largest magnitude, sum of squares, number of samples and distance travelled of each (4 k,).
-
-    In the worker: all signals of all slots over a long recording take hundreds of megabytes.
-    """
-
-    names: tuple[str, ...]
-
-    def __call__(self, simulated: Signals) -> FloatArray:
-        """Return the sizes of the named signals, in their units, one signal after the other."""
-        found = [
-            (np.max(np.abs(x)), x @ x, x.size, np.sum(np.abs(np.diff(x))))
-            for x in (simulated[name] for name in self.names)
-        ]
-        return np.array(found, dtype=np.float64).ravel()
 
 
 def _slots_of(case: Case) -> str:

@@ -320,11 +320,11 @@ class Selection:
             lead = block_gains((trial,), theirs, ours)
             sure = consistency(lead) >= SIGMAS and float(lead.sum()) >= SIGMAS**2
             large = float(lead.sum()) >= APART_SHARE * float(base @ base - ours @ ours)
-            if sure and (large or self._alone_is_noise(trial, part, ours, theirs)):
+            if sure and (large or self._only_theirs_shows(trial, part, ours, theirs)):
                 return True
         return False
 
-    def _alone_is_noise(self, trial: Trial, part: slice, ours: FloatArray, theirs: FloatArray) -> bool:
+    def _only_theirs_shows(self, trial: Trial, part: slice, ours: FloatArray, theirs: FloatArray) -> bool:
         """Whether a recording shows nothing of what one fit leaves there, but of what the other does.
 
         Then what it leaves is the other's misfit, however little beside the gain: the first has none to excuse it.

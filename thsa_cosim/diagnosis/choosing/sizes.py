@@ -47,6 +47,7 @@ def at_sizes(bench: Bench, base: Fit, held: FloatArray, proposals: Sequence[Prop
         vectors, costs = _tried(bench, unknowns, _rows(base, unknowns, proposal))
         best = int(np.argmin(costs))
         if costs[best] < WORTH * base.cost:
+            # A copy: of the fits of one proposal, `Selection` polishes one and keeps it for all.
             begun.append((costs[best], replace(proposal), unknowns, vectors[best]))
     begun.sort(key=lambda one: one[0])
     fits = [refit(bench, p, base, held, unknowns, vector) for _, p, unknowns, vector in begun[:FITTED]]

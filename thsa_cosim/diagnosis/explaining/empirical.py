@@ -14,13 +14,13 @@ from pathlib import Path
 from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Variant
-from thsa_cosim.diagnosis.catalogue.effects.inverter_dead_time import PAIRS
+from thsa_cosim.diagnosis.catalogue.effects.inverter_dead_time import PERIODS
 from thsa_cosim.diagnosis.catalogue.extend import (
     EMPIRICAL_NAME,
+    export_kept,
     extended_class,
     qualified,
     source_beside,
-    write_extended,
 )
 from thsa_cosim.diagnosis.catalogue.slots import find_slots
 from thsa_cosim.diagnosis.catalogue.superset import scales_of, slot_signals
@@ -36,10 +36,7 @@ from thsa_cosim.diagnosis.fitting.identified import Identified
 from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.results import EmpiricalLaw, EmpiricalTerm, Value
-from thsa_cosim.export import export_fmu
-from thsa_cosim.export.compile import native_platform
 from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
-from thsa_cosim.study import export_digest, is_made_from, note_made_from
 
 #: At most so many terms: a law of more says no more than a plot.
 _TERMS = 3
@@ -71,9 +68,7 @@ _TAKEN_UP = EffectParameter(
     "s_0", "1", 0.5, "share taken up at the start", "shape", 0.0, 1.0, starts=(0.0, 1.0)
 )
 _SIGN = _shape("i_s", "I", "current over which the sign turns", (0.01, 0.05))
-_ELECTRICAL = EffectParameter(
-    "n", "1", 6.0, "periods per revolution", "shape", 1.0, 144.0, starts=tuple(6.0 * pairs for pairs in PAIRS)
-)
+_ELECTRICAL = replace(PERIODS, lower=1.0)
 _FADING = EffectParameter(
     "T_f", "s", 10.0, "time over which E fades", role="shape", lower=0.5, upper=1e5, starts=(5.0, 100.0)
 )
@@ -210,12 +205,7 @@ class LawSearch:
         terms = candidates_of(EMPIRICAL, slots, {})
         beside = source_beside(self.spec.model, self.spec.package)
         source = extended_class(name, base, [*own, *terms], shapes, beside=beside)
-        fmu, platforms = self.folder / f"{name}.fmu", (native_platform().fmi3,)
-        made_from = export_digest(source, self.spec.package, platforms)
-        if not is_made_from(fmu, made_from):
-            file = write_extended(self.folder, name, source)
-            export_fmu(str(file), package=self.spec.package, output=fmu, platforms=platforms)
-            note_made_from(fmu, made_from)
+        fmu = export_kept(self.folder, name, source, self.spec.package)
         trials = with_fmu(self.trials, fmu)
         cases = [t.case for t in trials if t.part == "fit"]
         opening = partial(self.open_runner, simulation)

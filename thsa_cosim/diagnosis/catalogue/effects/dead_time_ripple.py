@@ -1,6 +1,9 @@
 """The part of the inverter's dead time that turns with the rotor: the sixth order of the electrical angle."""
 
-from thsa_cosim.diagnosis.catalogue.effect import Effect, EffectParameter, Variant
+from dataclasses import replace
+
+from thsa_cosim.diagnosis.catalogue.effect import Effect, Variant
+from thsa_cosim.diagnosis.catalogue.effects.inverter_dead_time import PERIODS, RIPPLE
 
 EFFECT = Effect(
     name="dead-time-ripple",
@@ -12,21 +15,7 @@ EFFECT = Effect(
         Variant(
             interface="PhaseEffect",
             block="DeadTimeRipple",
-            parameters=(
-                EffectParameter("u_s", "U", 0.1, "amplitude, sine part"),
-                EffectParameter("u_c", "U", 0.1, "amplitude, cosine part"),
-                EffectParameter(
-                    "n",
-                    "1",
-                    6.0,
-                    "periods per revolution",
-                    role="shape",
-                    lower=3.0,
-                    upper=144.0,
-                    starts=(12.0, 24.0, 42.0, 72.0),
-                    scanned=True,
-                ),
-            ),
+            parameters=(*RIPPLE[:2], replace(PERIODS, starts=(12.0, 24.0, 42.0, 72.0), scanned=True)),
         ),
     ),
 )

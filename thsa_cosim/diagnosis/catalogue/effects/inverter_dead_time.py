@@ -11,8 +11,22 @@ def voltage(p: Values, at: Connectors) -> FloatArray:
     return -p["U_d"] * np.clip(at["i_q"] / p["i_r"], -1.0, 1.0)
 
 
-#: Numbers of pole pairs whose ripple is looked for.
-PAIRS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12)
+#: Of a ripple of six periods per pole pair, its starts the usual numbers of them.
+PERIODS = EffectParameter(
+    "n",
+    "1",
+    6.0,
+    "periods of the ripple per revolution",
+    role="shape",
+    lower=3.0,
+    upper=144.0,
+    starts=tuple(6.0 * pairs for pairs in (1, 2, 3, 4, 5, 6, 7, 8, 10, 12)),
+)
+RIPPLE = (
+    EffectParameter("u_s", "U", 0.1, "amplitude of the ripple, sine part"),
+    EffectParameter("u_c", "U", 0.1, "amplitude of the ripple, cosine part"),
+    PERIODS,
+)
 
 EFFECT = Effect(
     name="inverter-dead-time",
@@ -42,20 +56,7 @@ EFFECT = Effect(
         Variant(
             interface="VoltageEffect",
             block="InverterDeadTime",
-            parameters=(
-                EffectParameter("u_s", "U", 0.1, "amplitude of its ripple, sine part"),
-                EffectParameter("u_c", "U", 0.1, "amplitude of its ripple, cosine part"),
-                EffectParameter(
-                    "n",
-                    "1",
-                    6.0,
-                    "periods of the ripple per revolution",
-                    role="shape",
-                    lower=3.0,
-                    upper=144.0,
-                    starts=tuple(6.0 * pairs for pairs in PAIRS),
-                ),
-            ),
+            parameters=RIPPLE,
             beside=True,
         ),
     ),

@@ -130,7 +130,7 @@ def _loads(time: FloatArray, load: Range | None) -> Iterator[tuple[str, FloatArr
 def _polygon(time: FloatArray, shape: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """(n,) ``shape`` of the share of the span of ``time`` (n,), straight between its corners."""
     corners = np.linspace(0.0, 1.0, CORNERS + 1)
-    return np.interp((time - time[0]) / (time[-1] - time[0]), corners, shape(corners))
+    return np.asarray(np.interp((time - time[0]) / (time[-1] - time[0]), corners, shape(corners)))
 
 
 def _triangle(periods: FloatArray) -> FloatArray:

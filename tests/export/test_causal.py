@@ -269,6 +269,19 @@ def test_a_part_that_cannot_stand_alone_is_answered_with_the_models_that_hold_it
     assert f"To use it as a part, export a model that holds it: {whole}, " in str(caught.value)
 
 
+def test_a_part_with_a_mistake_in_its_text_is_answered_with_the_mistake_alone(tmp_path: Path):
+    package = tmp_path / "P"
+    package.mkdir()
+    (package / "package.mo").write_text("package P end P;")
+    (package / "Whole.mo").write_text("within P; model Whole\n  P.Part part;\nend Whole;")
+    part = "within P; model Part Real x(start=1, fixed=true); Real y; equation der(x) = -{}; end Part;"
+    for name in ("x", "z"):
+        (package / "Part.mo").write_text(part.format(name))
+        with pytest.raises(ModelicaError) as caught:
+            causal_model("P.Part", package)
+        assert str(caught.value).endswith("export a model that holds it: P.Whole.") is (name == "x")
+
+
 def test_unknown_start_value_is_refused(tmp_path):
     with pytest.raises(ParameterError, match="Did you mean 'k'"):
         export_fmu(

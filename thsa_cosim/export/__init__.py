@@ -126,14 +126,16 @@ def causal_model(model: str, package: Path, libraries: Sequence[Path] = ()) -> "
     """
     from thsa_cosim.export.causal import make_causal
 
+    flat = None
     try:
-        return make_causal(flatten(model, package, libraries))
+        flat = flatten(model, package, libraries)
+        return make_causal(flat)
     except ModelicaError as error:
         try:
             return make_causal(flatten(model, package, libraries, folded=True))
         except ModelicaError:
             # What its flanges and inputs are connected to may be all that a part of a library lacks.
-            if not (whole := holders(model, package, libraries)):
+            if flat is None or not (whole := holders(model, package, libraries)):
                 raise error from None
             listed = ", ".join(whole[:_HOLDERS])
             raise ModelicaError(

@@ -317,6 +317,18 @@ def test_an_effect_that_explains_less_than_a_hundredth_of_all_is_dropped(
     assert bool(notes) is not stays
 
 
+@pytest.mark.parametrize(("visible", "stays"), [(0.15, True), (100.0, False)])
+def test_an_effect_whose_loss_would_be_visible_stays_however_little_it_is_beside_all(
+    visible: float, stays: bool, monkeypatch: pytest.MonkeyPatch
+):
+    own, declared, weights, accepted, final, held = accepted_by_hand(
+        {**WINDAGE, **STRIBECK}, "windage:motor", "stribeck:motor"
+    )
+    monkeypatch.setattr(room, "block_gains", lambda *_: np.full(10, 1.0))
+    kept, *_ = prune(own, declared, weights, accepted, final, held, visible)
+    assert (len(kept) == 2) is stays
+
+
 RIPPLE = {
     "motorEffect.cogging.a_s": 0.25, "motorEffect.cogging.a_c": -0.1, "motorEffect.cogging.n": 12.0,
     "motorEffect.cogging.a_s3": 0.1, "motorEffect.cogging.n_3": 18.0,

@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 
+import numpy as np
+
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
 from thsa_cosim.diagnosis.choosing.forms import best_form, rivals_forms
@@ -19,7 +21,7 @@ from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
 from thsa_cosim.diagnosis.choosing.selection import Say, Selection
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
-from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency
+from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, structures
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
@@ -277,8 +279,12 @@ def prune(
     accepted: list[Scored],
     current: Fit,
     held: FloatArray,
+    visible: float = np.inf,
 ) -> tuple[list[Scored], Fit, FloatArray, list[str]]:
-    """Drop every earlier effect that the later ones have made needless."""
+    """Drop every earlier effect that the later ones have made needless.
+
+    One that explains more than ``visible`` (rms structure, in standard deviations of the noise) of a signal stays.
+    """
     notes: list[str] = []
     while len(accepted) > 1:
         for dropped in accepted[:-1]:
@@ -293,6 +299,9 @@ def prune(
                 continue
             lost = block_gains(bench.of("validate"), validate, held)
             total = float(weights.base_held @ weights.base_held - held @ held)
+            sure = visible < np.inf and consistency(lost) >= SIGMAS
+            if sure and _explained(bench, weights, validate, held) > visible**2:
+                continue
             if consistency(lost) < SIGMAS or float(lost.sum()) < 0.01 * total:
                 notes.append(
                     f"{dropped.candidate.name} was dropped: the effects found after it explain the same"
@@ -302,3 +311,10 @@ def prune(
         else:
             break
     return accepted, current, held, notes
+
+
+def _explained(bench: Bench, weights: ChannelWeights, without: FloatArray, held: FloatArray) -> float:
+    """Mean squared structure, in variances of the noise, that ``held`` (N,) lacks of ``without``, in one signal."""
+    trials = bench.of("validate")
+    more, less = (structures(trials, weights.plain(residual, "validate")) for residual in (without, held))
+    return max(more[name] - less[name] for name in more)

@@ -29,6 +29,7 @@ from thsa_cosim.diagnosis.choosing.findings import values_of
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.choosing.selection import Say
+from thsa_cosim.diagnosis.choosing.verdict import VISIBLE
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -73,7 +74,8 @@ _ELECTRICAL = replace(PERIODS, lower=1.0)
 _FADING = EffectParameter(
     "T_f", "s", 10.0, "time over which E fades", role="shape", lower=0.5, upper=1e5, starts=(5.0, 100.0)
 )
-#: Interface and class → the parameters of every term.
+#: Interface and class → the parameters of every term. A force in proportion to the load with the sign of neither is
+#: none: it gives back all that it takes, so it is no friction but a gain, which is searched at the sensors.
 _LIBRARY: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
     ("FrictionEffect", "Empirical"): (
         (_k("k_1", "F", "1"),),
@@ -85,7 +87,6 @@ _LIBRARY: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
         (_k("k_zs", "F/Z", "z sgn(v)"),),
         (_k("k_zzs", "F/Z^2", "z^2 sgn(v)"),),
         (_k("k_zv", "F/Z/V", "z v"),),
-        (_k("k_N", "1", "N"),),
         (_k("k_Ns", "1", "|N| sgn(v)"),),
         (_k("k_Nv", "1/V", "|N| v"),),
         (_k("k_NNs", "1/F", "N^2 sgn(v)"),),
@@ -253,7 +254,7 @@ class LawSearch:
         weights.base_held = found.base_validate * factors
         together = [*self.accepted, *found.accepted]
         kept, final, held, notes = prune(
-            bench, self.declared, weights, together, found.final, found.final_validate * factors
+            bench, self.declared, weights, together, found.final, found.final_validate * factors, VISIBLE
         )
         terms = replace(
             found,

@@ -2,6 +2,8 @@
 
 import inspect
 import json
+import shutil
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -85,6 +87,26 @@ def test_what_is_not_there_is_one_sentence(tmp_path: Path, capsys: pytest.Captur
     for name in ("a.fmu", "a.csv", "a.toml"):
         assert run_command(["check", str(tmp_path / name)]) == 2
         assert name in capsys.readouterr().err
+
+
+def test_a_spreadsheet_is_answered_with_what_check_reads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A workbook is a zip archive, too; an FMU may have any ending."""
+    book, old = tmp_path / "run.xlsx", tmp_path / "run.xls"
+    with zipfile.ZipFile(book, "w") as archive:
+        archive.writestr("xl/workbook.xml", "<workbook/>")
+    old.write_bytes(b"\xd0\xcf\x11\xe0")
+    for path in (book, old):
+        assert run_command(["check", str(path)]) == 2
+        said = capsys.readouterr().err.strip()
+        assert said.startswith(
+            f"error: {path}: check reads FMUs (.fmu, .ssp), scenarios (.toml) and recordings (.csv, "
+        )
+        assert said.endswith("and this is none of them; save a table as .csv.")
+    renamed = tmp_path / "lag.zip"
+    shutil.copy(build.lag2("CRASH_INSTANTIATE"), renamed)
+    assert run_command(["check", str(renamed), "--json"]) == 3
 
 
 def test_the_command_and_the_function_have_the_same_limits() -> None:

@@ -115,6 +115,21 @@ def test_the_package_of_the_command_line_takes_the_place_of_the_scenarios(tmp_pa
     assert changed == {"diagnose.package"}
 
 
+def test_one_that_is_interrupted_says_that_there_is_no_result_yet_and_how_to_continue(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    def pressed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("thsa_cosim.diagnosis.run.open_superset", pressed)
+    path, study = scenario(tmp_path, 2000), tmp_path / "study"
+    assert cli.run_command(["diagnose", str(path), "-o", str(study)]) == 130
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"interrupted before there was a result ({study} holds no result.json); finished runs are kept, continue with:"
+        f" thsa-cosim diagnose {path} -o {study}"
+    )
+
+
 @pytest.mark.slow
 def test_it_finds_the_effect_and_writes_a_model_that_predicts_to_the_noise(tmp_path: Path):
     chosen = '[diagnose]\neffects = ["windage", "stribeck", "current-sensor-gain", "friction-run-in"]\n'

@@ -8,7 +8,7 @@ import pytest
 ca = pytest.importorskip("casadi", reason="the export extra is not installed")
 
 from thsa_cosim.errors import ModelicaError, ParameterError, ThsaCosimError
-from thsa_cosim.export import export_fmu
+from thsa_cosim.export import causal_model, export_fmu
 from thsa_cosim.export.causal import CausalModel, make_causal
 from thsa_cosim.export.flatten import flatten
 from thsa_cosim.export.units import base_unit
@@ -250,6 +250,36 @@ def test_unsupported_models_get_one_sentence(tmp_path, name):
 def test_unknown_class_is_answered_with_the_closest():
     with pytest.raises(ModelicaError, match=r"THSA holds no class 'Actuatr'\. Did you mean 'Actuator'"):
         flatten("Actuatr", THSA)
+
+
+@pytest.mark.parametrize(
+    ("part", "why", "whole"),
+    [
+        ("Motor", "the input T_w starts at T, which is no parameter or constant.", "THSA.Benches.Motor"),
+        ("Screw", "structurally singular", "THSA.Actuator"),
+        ("NoBack", "singular", "THSA.Actuator"),
+    ],
+)
+def test_a_part_that_cannot_stand_alone_is_answered_with_the_models_that_hold_it(
+    part: str, why: str, whole: str
+):
+    with pytest.raises(ModelicaError) as caught:
+        causal_model(f"THSA.{part}", THSA)
+    assert str(caught.value).startswith(f"THSA.{part}: {why}")
+    assert f"To use it as a part, export a model that holds it: {whole}, " in str(caught.value)
+
+
+def test_a_part_with_a_mistake_in_its_text_is_answered_with_the_mistake_alone(tmp_path: Path):
+    package = tmp_path / "P"
+    package.mkdir()
+    (package / "package.mo").write_text("package P end P;")
+    (package / "Whole.mo").write_text("within P; model Whole\n  P.Part part;\nend Whole;")
+    part = "within P; model Part Real x(start=1, fixed=true); Real y; equation der(x) = -{}; end Part;"
+    for name in ("x", "z"):
+        (package / "Part.mo").write_text(part.format(name))
+        with pytest.raises(ModelicaError) as caught:
+            causal_model("P.Part", package)
+        assert str(caught.value).endswith("export a model that holds it: P.Whole.") is (name == "x")
 
 
 def test_unknown_start_value_is_refused(tmp_path):

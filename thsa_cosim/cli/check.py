@@ -2,14 +2,14 @@
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from thsa_cosim.cli.options import PATH, console
-from thsa_cosim.errors import ScenarioError
+from thsa_cosim.errors import FmuError, ScenarioError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -79,6 +79,7 @@ def check(
         from thsa_cosim.fmu.sources import compile_sources
 
         path = compile_sources(path, compiled)
+    _refuse_what_is_nothing(path)
     values, texts = _start_values(path, starts)
     given = {"duration": duration, "step": step, "values": values, "texts": texts, "ends": _pairs(ends)}
     points = _sensitivities(path) if sensitivity else ()
@@ -94,6 +95,22 @@ def check(
     else:
         show(console())
     return FAILED if content["verdict"] == "failed" else 0
+
+
+def _refuse_what_is_nothing(path: Path) -> None:
+    """FmuError for a file of another ending that is no FMU either, such as a spreadsheet."""
+    from thsa_cosim.fmu.archive import open_archive
+    from thsa_cosim.recordings import SUFFIXES
+
+    if path.suffix.lower() in (".toml", ".fmu", ".ssp", *SUFFIXES) or not path.is_file():
+        return
+    with suppress(FmuError), open_archive(path) as archive:
+        if {"modelDescription.xml", "SystemStructure.ssd"} & set(archive.namelist()):
+            return
+    raise FmuError(
+        f"{path}: check reads FMUs (.fmu, .ssp), scenarios (.toml) and recordings ({', '.join(SUFFIXES)}), and this is"
+        " none of them; save a table as .csv."
+    )
 
 
 def _start_values(path: Path, starts: tuple[str, ...]) -> tuple[dict[str, float], dict[str, str]]:

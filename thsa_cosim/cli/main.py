@@ -113,7 +113,7 @@ def run_command(arguments: list[str]) -> int:
     except ThsaCosimError as error:
         return _fail(str(error), error.exit_code)
     except Interrupted as interruption:
-        return _fail(f"interrupted; finished runs are kept, continue with: {interruption}", 130, label=False)
+        return _fail(str(interruption), 130, label=False)
     except (KeyboardInterrupt, click.Abort):
         return _fail("interrupted; the same command starts again, or continues its study.", 130, label=False)
     except BrokenPipeError:

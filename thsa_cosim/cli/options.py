@@ -59,10 +59,22 @@ class StudyOptions:
         """Conduct the study and write its page, unless that was declined; Interrupted if it was cut short."""
         from thsa_cosim.api.conduct import conduct
 
-        done = conduct(asked, quiet=self.quiet)
+        go_on = f"finished runs are kept, continue with: {asked.place.command}"
+        try:
+            done = conduct(asked, quiet=self.quiet)
+        except KeyboardInterrupt:
+            from thsa_cosim.report.files import RESULT
+            from thsa_cosim.study import MARKER
+
+            folder = asked.place.folder
+            if not (folder / MARKER).exists() or (folder / RESULT).exists():
+                raise  # nothing has begun, or all is there
+            raise Interrupted(
+                f"interrupted before there was a result ({folder} holds no {RESULT}); {go_on}"
+            ) from None
         done = replace(done, files=(*done.files, *self.page(done.folder)))
         if done.status == "interrupted":
-            raise Interrupted(asked.place.command)
+            raise Interrupted(f"interrupted; {go_on}")
         return done
 
     def repeat(self, command: str, folder: Path, package: Path | None = None) -> str:
@@ -167,7 +179,7 @@ def study_options(command: Callable[Concatenate[StudyOptions, P], None]) -> Call
 
 
 class Interrupted(Exception):
-    """A study was interrupted and has written what it has; the message is the command that continues it."""
+    """A study was interrupted and has kept what it has; the message says so, with the command that continues it."""
 
 
 def console(*, stderr: bool = False) -> "Console":

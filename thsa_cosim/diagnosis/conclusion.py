@@ -194,7 +194,7 @@ class Conclusion:
             self.study.place.say(f"exporting the model with {', '.join(s.candidate.name for s in accepted)}")
             model, fmu = self._written(accepted, final)
         self.study.place.say("identifying the extended model from the drawing")
-        after = self._identify(fmu or declared.fmu, wider, [wider.start, hint], accepted)
+        after = self._identify(fmu or declared.fmu, wider, [wider.at_drawing(hint), hint], accepted)
         if self.box is not None:
             values = {**after.trials[0].case.fixed, **after.fit.unknowns.named(after.fit.vector)}
             wrapper = write_wrapper(self.study.folder, self.scenario.fmu.path, self.box.wrapper, values)
@@ -214,7 +214,7 @@ class Conclusion:
         model, fmu = self._written(added, terms.final)
         wider = extended_unknowns(self.unknowns, added)
         hint = terms.final.at(wider.names)
-        return _Model(self._identify(fmu, wider, [wider.start, hint], added), model, fmu)
+        return _Model(self._identify(fmu, wider, [wider.at_drawing(hint), hint], added), model, fmu)
 
     def _written(self, accepted: Sequence[Scored], final: Fit) -> tuple[Path, Path]:
         """Class and FMU of the model with the effects ``accepted``."""

@@ -14,13 +14,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thsa_cosim.errors import MissingExtraError, ModelicaError, ParameterError, did_you_mean
-from thsa_cosim.export.flatten import flatten, list_models
+from thsa_cosim.export.flatten import flatten, holders, list_models
 from thsa_cosim.shipped import modelica_package
 
 if TYPE_CHECKING:
     from thsa_cosim.export.causal import CausalModel
 
 __all__ = ["export_fmu", "list_models"]
+
+_HOLDERS = 3
+"""How many models a message names at most that hold what cannot be exported alone."""
 
 
 def export_fmu(
@@ -123,10 +126,18 @@ def causal_model(model: str, package: Path, libraries: Sequence[Path] = ()) -> "
     """
     from thsa_cosim.export.causal import make_causal
 
+    flat = None
     try:
-        return make_causal(flatten(model, package, libraries))
+        flat = flatten(model, package, libraries)
+        return make_causal(flat)
     except ModelicaError as error:
         try:
             return make_causal(flatten(model, package, libraries, folded=True))
         except ModelicaError:
-            raise error from None
+            # What its flanges and inputs are connected to may be all that a part of a library lacks.
+            if flat is None or not (whole := holders(model, package, libraries)):
+                raise error from None
+            listed = ", ".join(whole[:_HOLDERS])
+            raise ModelicaError(
+                f"{error} To use it as a part, export a model that holds it: {listed}."
+            ) from None

@@ -1,6 +1,7 @@
 """A class by its name or by its file → the flat model; where the libraries are looked for."""
 
 import os
+import re
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ __all__ = [
     "FlatVariable",
     "components",
     "flatten",
+    "holders",
     "list_models",
     "locate",
 ]
@@ -93,6 +95,26 @@ def _base(library: Library, base: str, name: str) -> tuple[ClassDefinition | Non
         if qualified != name and (found := library.find(qualified)) is not None:
             return found, qualified
     return None, base
+
+
+def holders(model: str, package: Path, libraries: Sequence[Path] = ()) -> list[str]:
+    """Classes of a class's own package that hold a component of it, those that share its name first.
+
+    By the text of the files, without parsing them: for a message. Only a qualified name is recognised.
+    """
+    library, _, name = _find(model, package, libraries)
+    top, own = name.split(".")[0], name.rsplit(".", 1)[-1]
+    definition = library.top(top)
+    if definition is None or definition.file.name != "package.mo":
+        return []
+    root = definition.file.parent
+    component = re.compile(rf"^\s*{re.escape(name)}\s+\w", re.MULTILINE)
+    found = [
+        ".".join((top, *file.relative_to(root).with_suffix("").parts))
+        for file in sorted(root.rglob("*.mo"))
+        if file.name != "package.mo" and component.search(file.read_text(encoding="utf-8", errors="replace"))
+    ]
+    return sorted(found, key=lambda holder: holder.rsplit(".", 1)[-1] != own)
 
 
 def list_models(library: Path, search: Sequence[Path] = ()) -> list[str]:

@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
+from thsa_cosim.errors import ModelicaError
+from thsa_cosim.export.discrete import referenced
 from thsa_cosim.export.model import ModelVariable, column
 from thsa_cosim.modelica.flat import FlatVariable
 
@@ -82,7 +84,17 @@ class VariableTable:
         if kind == "dependent":
             return None
         given = variable.start if variable.binding is None else variable.binding
-        return self.builder.evaluate(given) or 0.0
+        try:
+            return self.builder.evaluate(given) or 0.0
+        except ModelicaError:
+            known = self.builder.flat.variables
+            varying = [n for n in sorted(referenced([given])) if n in known and not _is_fixed(known[n])]
+            if not varying:
+                raise
+        raise ModelicaError(
+            f"{self.builder.flat.name}: the {kind} {variable.name} starts at {varying[0]}, which is no parameter or"
+            " constant."
+        )
 
     def _variable(self, variable: FlatVariable, kind: str, index: int, start: float | None) -> ModelVariable:
         evaluate = self.builder.evaluate
@@ -99,6 +111,10 @@ class VariableTable:
             nominal=evaluate(variable.nominal),
             discrete=variable.variability == "discrete",
         )
+
+
+def _is_fixed(variable: FlatVariable) -> bool:
+    return variable.variability in ("parameter", "constant")
 
 
 def _rate(unit: str | None) -> str | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -285,3 +286,52 @@ def test_a_step_that_falls_short_is_taken_further(monkeypatch: pytest.MonkeyPatc
     short = refine(bench(wave), start, start.start, iterations=1)
     assert short is not None
     assert 1.5 < short.vector[0] < 2.5
+
+
+def test_a_step_that_gains_what_it_promised_is_the_only_one_that_is_tried(monkeypatch: pytest.MonkeyPatch):
+    """Two more, damped more, run only where the first one disappoints."""
+    asked: list[int] = []
+    residuals = Bench.residuals
+
+    def counted(self: Bench, unknowns: Unknowns, vectors: np.ndarray, part: str) -> list[np.ndarray | None]:
+        asked.append(len(vectors))
+        return residuals(self, unknowns, vectors, part)
+
+    monkeypatch.setattr(Bench, "residuals", counted)
+
+    def parabola(values: Mapping[str, float]) -> np.ndarray:
+        return values["a"] + values["o"] * TIME + values["r"] * TIME**2
+
+    refine(bench(parabola), FREE, FREE.start)
+    assert (1, 2) not in pairwise(asked), "linear: the step is right"
+    del asked[:]
+
+    def cliff(values: Mapping[str, float]) -> np.ndarray:
+        return decay(values) + 100.0 * (values["a"] > 1.2)
+
+    refine(bench(cliff), FREE, FREE.start, iterations=1)
+    assert (1, 2) in pairwise(asked), "the whole step falls off the cliff"
+
+
+def test_a_fit_that_what_is_reached_elsewhere_is_too_far_from_is_given_up():
+    far = np.array([9.0, 5.0, -9.0])
+    whole = refine(bench(), FREE, far, iterations=30)
+    assert whole is not None
+    assert whole.converged
+    np.testing.assert_allclose(whole.vector, expected()[0], rtol=1e-2)
+    jump = lambda values: decay(values) + np.sin(200.0 * values["r"]) + 5.0  # noqa: E731  a rough landscape
+    crawling = bench(jump)
+    refine(crawling, FREE, far, iterations=12)
+    given_up = bench(jump)
+    fit = refine(given_up, FREE, far, iterations=12, to_beat=whole.cost)
+    assert fit is not None
+    assert not fit.converged
+    assert given_up.evaluations < crawling.evaluations
+    same = refine(bench(), FREE, far, iterations=30, to_beat=whole.cost)
+    assert same is not None
+    np.testing.assert_array_equal(same.vector, whole.vector, err_msg="one that gets there is not given up")
+
+
+def test_the_drawing_is_that_of_the_declared_parameters_alone():
+    mixed = Unknowns((unknown("a", 1.0, declared=True), unknown("e", 4.0, declared=False)))
+    np.testing.assert_array_equal(mixed.at_drawing(np.array([2.0, 3.0])), [1.0, 3.0])

@@ -135,10 +135,10 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scor
     A missing effect bends the declared parameters; from there an effect that acts by contact may not find its optimum.
     """
     unknowns = choice.fit.unknowns
-    drawing = np.where([u.declared for u in unknowns.members], unknowns.start, choice.fit.vector)
     fits = [refine(bench, unknowns, choice.fit.vector, steps=choice.fit.steps)]
     if fits[0] is None or _is_bent(bench, fits[0]) or fits[0].misfit > ENOUGH * fits[0].residual.size:
-        fits.append(refine(bench, unknowns, drawing))
+        known = np.inf if fits[0] is None else fits[0].cost
+        fits.append(refine(bench, unknowns, unknowns.at_drawing(choice.fit.vector), to_beat=known))
     best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)
     if best is None:
         return choice

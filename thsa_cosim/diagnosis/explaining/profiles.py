@@ -9,6 +9,9 @@ from thsa_cosim.signals import FloatArray, Signals
 
 #: A profile may travel this much further than the recordings did (integral of the command), where no limit says else.
 TRAVEL = 1.2
+#: Waves are polygons with so many corners: 40 a period of the fastest, 0.3 % of its size off. A solver stops at each
+#: corner, and a wave that is sampled at the grid's times has as many as samples.
+CORNERS = 400
 
 
 @dataclass(frozen=True)
@@ -90,8 +93,8 @@ class _Grid:
         return np.asarray(np.interp(self.time - self.time[0], times, values))
 
     def wave(self, shape: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """(n,) ``shape`` of the share of the span that has passed."""
-        return np.asarray(shape((self.time - self.time[0]) / self.span))
+        """(n,) ``shape`` of the share of the span that has passed, as a polygon."""
+        return _polygon(self.time, shape)
 
 
 def _menu(grid: _Grid, top: float) -> Iterator[tuple[str, FloatArray]]:
@@ -120,9 +123,14 @@ def _loads(time: FloatArray, load: Range | None) -> Iterator[tuple[str, FloatArr
         return
     yield " at the lowest load", np.full(time.size, load.lowest)
     yield " at the highest load", np.full(time.size, load.highest)
-    phase = 2.0 * np.pi * 3.0 * (time - time[0]) / (time[-1] - time[0])
-    swept = load.lowest + (load.highest - load.lowest) * (0.5 - 0.5 * np.cos(phase))
-    yield " under a load that rises and falls", swept
+    swept = _polygon(time, lambda p: 0.5 - 0.5 * np.cos(2.0 * np.pi * 3.0 * p))
+    yield " under a load that rises and falls", load.lowest + (load.highest - load.lowest) * swept
+
+
+def _polygon(time: FloatArray, shape: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """(n,) ``shape`` of the share of the span of ``time`` (n,), straight between its corners."""
+    corners = np.linspace(0.0, 1.0, CORNERS + 1)
+    return np.asarray(np.interp((time - time[0]) / (time[-1] - time[0]), corners, shape(corners)))
 
 
 def _triangle(periods: FloatArray) -> FloatArray:

@@ -22,6 +22,11 @@ SMALLEST, LARGEST = 1e-7, 0.3
 #: see events that move, and make the outputs more sensitive than they are over a longer way: steps stop short. Both
 #: were set while looking at one simulated unit with stick-slip.
 UNDERRATED, FURTHER = 1.25, (2.0, 4.0, 8.0)
+#: No step that is damped more is tried where one gains this share of what it promised.
+FORESEEN = 0.5
+#: A fit is given up so many steps from what is reached elsewhere, each as large as the last. Set while looking at two
+#: simulated units, with cogging that sticks and with a Stribeck friction of another form.
+HOPELESS = 4.0
 #: Information (of unknowns each scaled to 1) below which a combination of them is not determined at all.
 DETERMINED = 1e-11
 
@@ -151,11 +156,13 @@ def refine(
     fresh: list[int] | None = None,
     iterations: int = 8,
     enough: float = 1.0,
+    to_beat: float = np.inf,
 ) -> Fit | None:
     """Minimise the fit recordings' squared residuals from ``vector`` (n,).
 
     ``jacobian`` (N, n) is used as given at the start; in later iterations the columns ``fresh`` (default all) are
-    taken anew. Stops when a step promises or brings less than ``enough``. None if the start cannot be simulated.
+    taken anew. Stops when a step promises or brings less than ``enough``, or so little that the cost ``to_beat``,
+    reached elsewhere, is HOPELESS steps away. None if the start cannot be simulated.
     """
     n = len(unknowns.members)
     vector = unknowns.clip(vector)
@@ -185,6 +192,8 @@ def refine(
         gained = cost - better.cost
         vector, residual, cost = better.vector, better.residual, better.cost
         response, stale = None, True
+        if cost - HOPELESS * max(gained, promised) > to_beat:
+            break
         if gained < enough:
             converged = True
             break
@@ -205,8 +214,10 @@ def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, 
         promised = float(-2.0 * gradient @ step - step @ information @ step)
         if promised < 1e-3:
             return None, promised, damping
-        found = bench.residuals(unknowns, np.array(trials), "fit")
-        costs = [np.inf if r is None else cost_of(unknowns, v, r) for v, r in zip(trials, found, strict=True)]
+        found, costs = _tried(bench, unknowns, trials[:1])
+        if not state.cost - costs[0] > FORESEEN * promised:
+            others = _tried(bench, unknowns, trials[1:])
+            found, costs = [*found, *others[0]], [*costs, *others[1]]
         best = int(np.argmin(costs))
         residual = found[best]
         if costs[best] < state.cost and residual is not None:
@@ -217,6 +228,15 @@ def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, 
             return better, promised, damping
         damping = dampings[-1] * 100.0
     return None, promised, damping
+
+
+def _tried(
+    bench: Bench, unknowns: Unknowns, vectors: Sequence[FloatArray]
+) -> tuple[list[FloatArray | None], list[float]]:
+    """Residuals (N,) and cost of each vector (n,); None and infinite where a run fails."""
+    found = bench.residuals(unknowns, np.array(vectors), "fit")
+    costs = [np.inf if r is None else cost_of(unknowns, v, r) for v, r in zip(vectors, found, strict=True)]
+    return list(found), costs
 
 
 def _further(bench: Bench, state: Fit, better: Fit) -> Fit:

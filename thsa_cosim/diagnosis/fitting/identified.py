@@ -78,15 +78,17 @@ def identify_model(
         begun = [_runs(bench, unknowns, start) for start in starts]
         fits: list[Fit] = []
         ends: list[tuple[FloatArray, float]] = []
-        for vector, residual in begun:
+        costs = [np.inf if r is None else cost_of(unknowns, v, r) for v, r in begun]
+        for number, (vector, residual) in enumerate(begun):
             known = min((f.cost for f in fits), default=np.inf)
             if residual is None:
                 continue
-            cost = cost_of(unknowns, vector, residual)
+            cost = costs[number]
             if fits and known <= cost + 1.0:
                 ends.append((vector, cost))
                 continue  # the fit so far is better than this start
-            fit = refine(bench, unknowns, vector, residual=residual, iterations=12)
+            rest = min([known, *costs[number + 1 :]])
+            fit = refine(bench, unknowns, vector, residual=residual, iterations=12, to_beat=rest)
             fits += [] if fit is None else [fit]
         best = min(fits, key=lambda f: f.cost, default=None)
         ends += [(f.vector, f.cost) for f in fits if f is not best]

@@ -53,6 +53,10 @@ class Unknowns:
         """(n,) start values."""
         return np.array([u.start for u in self.members])
 
+    def at_drawing(self, vector: FloatArray) -> FloatArray:
+        """(n,) ``vector`` with the declared parameters at their start values."""
+        return np.where([u.declared for u in self.members], self.start, vector)
+
     @property
     def scale(self) -> FloatArray:
         """(n,) ordinary changes."""

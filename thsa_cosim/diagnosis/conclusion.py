@@ -3,7 +3,7 @@
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +31,7 @@ from thsa_cosim.diagnosis.choosing.spread import between_models
 from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
 from thsa_cosim.diagnosis.explaining.balance import close_balances
 from thsa_cosim.diagnosis.explaining.dependence import dependence
-from thsa_cosim.diagnosis.explaining.empirical import LawSearch, law_of
+from thsa_cosim.diagnosis.explaining.empirical import FoundLaw, LawSearch, law_of
 from thsa_cosim.diagnosis.explaining.evidence import evidence
 from thsa_cosim.diagnosis.explaining.experiment import separating_experiment
 from thsa_cosim.diagnosis.explaining.slips import with_slips
@@ -93,13 +93,16 @@ class Conclusion:
         verdict = verdict_on(found_errors, len(found.accepted), _tested(found))
         law: EmpiricalLaw | None = None
         if verdict == "unexplained-structure" and self.box is None:
-            terms = self._law_terms(extended.identified)
-            if terms is not None and self.spec.empirical:
+            searched = self._law_search(extended.identified)
+            if searched is not None and self.spec.empirical:
                 # The share stays that of the effects: a law describes and explains nothing.
-                extended = self._with_law(terms)
-            if terms is not None:
-                fit = extended.identified.fit if self.spec.empirical else terms.final
-                law = law_of(terms, fit, added=self.spec.empirical)
+                extended = self._with_law(searched)
+                found = replace(found, accepted=searched.effects, notes=(*found.notes, *searched.terms.notes))
+                if not found.accepted:
+                    share = left_over(held_out, before.validate, before.validate)
+            if searched is not None:
+                fit = extended.identified.fit if self.spec.empirical else searched.terms.final
+                law = law_of(searched.terms, fit, added=self.spec.empirical)
         after = extended.identified
         changed = after is not before
         between = between_models(found, after.fit, self.bench.of("fit"))
@@ -152,7 +155,7 @@ class Conclusion:
             threshold=found.rounds[0].threshold if found.rounds else 0.0,
             evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if changed else 0),
             failures=_failures(self.bench, *([before, after] if changed else [before])),
-            notes=(*self._notes(extended), *told, *([said] if said else [])),
+            notes=(*self._notes(extended, found), *told, *([said] if said else [])),
             data=with_slips(scenario.data, after, scenario.file_units),
             asked=scenario.table.model_dump(mode="json", by_alias=True, exclude_unset=True),
             coupling=coupled if isinstance(coupled, CouplingError) else None,
@@ -200,20 +203,20 @@ class Conclusion:
             wrapper = write_wrapper(self.study.folder, self.scenario.fmu.path, self.box.wrapper, values)
         return _Model(after, model, fmu, wrapper)
 
-    def _law_terms(self, after: Identified) -> Attribution | None:
-        """Terms of an empirical law in what the extended model leaves."""
+    def _law_search(self, after: Identified) -> FoundLaw | None:
+        """An empirical law in what the extended model leaves."""
         self.study.place.say("looking for an empirical law")
         return LawSearch(
             self.scenario, self.spec, self.trials, self.unknowns, self.known, self.found.accepted, after,
             self.study.folder / WORK, self.study.open_runner, self.machine, self.study.place.say,
         ).find()  # fmt: skip
 
-    def _with_law(self, terms: Attribution) -> _Model:
-        """The model with its effects and an empirical law."""
-        added = (*self.found.accepted, *terms.accepted)
-        model, fmu = self._written(added, terms.final)
+    def _with_law(self, law: FoundLaw) -> _Model:
+        """The model with an empirical law and the effects that are still needed."""
+        added, final = (*law.effects, *law.terms.accepted), law.terms.final
+        model, fmu = self._written(added, final)
         wider = extended_unknowns(self.unknowns, added)
-        hint = terms.final.at(wider.names)
+        hint = final.at(wider.names)
         return _Model(self._identify(fmu, wider, [wider.at_drawing(hint), hint], added), model, fmu)
 
     def _written(self, accepted: Sequence[Scored], final: Fit) -> tuple[Path, Path]:
@@ -230,17 +233,17 @@ class Conclusion:
             trials = with_wrapper(trials, self.box.wrapper, fixed_shapes(accepted))
         return identify_model(fmu, trials, unknowns, starts, self.scenario.simulation, self.study.open_runner)
 
-    def _notes(self, extended: _Model) -> Iterator[str]:
+    def _notes(self, extended: _Model, found: Attribution) -> Iterator[str]:
         """What a reader of the result should know: sentences."""
         yield from self.bench.notes
         yield from note_on_means(self.trials)
-        yield from self.found.notes
+        yield from found.notes
         if self.box is not None:
             yield from self.box.notes
-        if not _tested(self.found):
-            yield _untested(self.found, self.effects)
+        if not _tested(found):
+            yield _untested(found, self.effects)
         yield from off_the_drawing(extended.identified.fit)
-        yield from doubts(s.candidate.effect for s in self.found.accepted)
+        yield from doubts(s.candidate.effect for s in found.accepted)
         if extended.model is not None and extended.fmu is not None:
             again = export_command(extended.model, self.spec.package, extended.fmu)
             yield f"{extended.fmu.name} is for {native_platform().fmi3} only; {again} compiles it for all platforms"

@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis.choosing.test_decision import STRIBECK, WINDAGE, accepted_by_hand
 from thsa_cosim.diagnosis.catalogue import extend
 from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue.slots import Slot
-from thsa_cosim.diagnosis.choosing.attribution import _is_taken
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, _is_taken
 from thsa_cosim.diagnosis.choosing.forms import _is_form
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.choosing.selection import REFINED, worth_refining
-from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL, law_of
+from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL, FoundLaw, LawSearch, law_of
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 
 PACKAGE = Path(__file__).parents[3] / "modelica" / "THSA"
@@ -101,3 +102,40 @@ def test_the_wave_of_the_voltage_is_offered_beside_the_soft_sign_whose_width_it_
     (sign,) = [v for v in variants if v.parameters[0].name == "k_s"]
     assert {p.name for p in wave.parameters} & {p.name for p in sign.parameters} == {"i_s"}
     assert not any(e.variants[0].beside for e in EMPIRICAL if e.variants[0] is not wave)
+
+
+def beside_a_law(true: dict[str, float], *, added: bool = True) -> tuple[FoundLaw, Attribution]:
+    """What a search keeps of windage, accepted first, once friction that falls with the speed has joined as a law."""
+    own, declared, weights, (effect, term), final, held = accepted_by_hand(
+        true, "windage:motor", "stribeck:motor"
+    )
+    found = Attribution(
+        term.fit, 0.0, (), (term,), final,
+        weights.plain(weights.base_held, "validate"), weights.plain(held, "validate"),
+    )  # fmt: skip
+    asked: Any = SimpleNamespace(empirical=added)
+    none: Any = None
+    search = LawSearch(none, asked, (), declared, (), (effect,), none, none, none, none)
+    return search._without_needless(own, found), found
+
+
+def test_an_effect_that_a_law_makes_needless_is_dropped():
+    law, _ = beside_a_law(STRIBECK)
+    assert law.effects == ()
+    assert [s.candidate.name for s in law.terms.accepted] == ["stribeck:motor"]
+    assert "motorEffect.windage.b_q" not in law.terms.final.unknowns.names
+    assert law.terms.notes == ("windage:motor was dropped: the effects found after it explain the same",)
+    np.testing.assert_allclose(np.mean(law.terms.final_validate**2), 1.0, atol=0.1)
+
+
+def test_an_effect_that_is_needed_beside_a_law_stays():
+    law, found = beside_a_law({**WINDAGE, **STRIBECK})
+    assert [s.candidate.name for s in law.effects] == ["windage:motor"]
+    assert law.terms.accepted == found.accepted
+    assert law.terms.final is found.final
+
+
+def test_beside_a_law_that_is_only_described_every_effect_stays():
+    law, found = beside_a_law(STRIBECK, added=False)
+    assert [s.candidate.name for s in law.effects] == ["windage:motor"]
+    assert law.terms is found

@@ -24,7 +24,7 @@ from thsa_cosim.diagnosis.catalogue.extend import (
 )
 from thsa_cosim.diagnosis.catalogue.slots import find_slots
 from thsa_cosim.diagnosis.catalogue.superset import scales_of, slot_signals
-from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute, prune
 from thsa_cosim.diagnosis.choosing.findings import values_of
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
@@ -35,6 +35,7 @@ from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified
 from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
+from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.diagnosis.results import EmpiricalLaw, EmpiricalTerm, Value
 from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
 
@@ -176,6 +177,14 @@ EMPIRICAL = tuple(
 
 
 @dataclass(frozen=True, eq=False)
+class FoundLaw:
+    """The terms of a law, and the ``effects`` accepted before that are still needed beside them."""
+
+    terms: Attribution
+    effects: tuple[Scored, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class LawSearch:
     """Where a law is searched: beside the ``accepted`` effects, from the model ``after`` that holds them."""
 
@@ -191,7 +200,7 @@ class LawSearch:
     machine: Machine
     say: Say = lambda _: None
 
-    def find(self) -> Attribution | None:
+    def find(self) -> FoundLaw | None:
         """The terms that pass the gate; None if there is none, or nothing can be simulated."""
         assert self.spec.model is not None
         base = qualified(self.spec.model, self.spec.package)
@@ -228,7 +237,32 @@ class LawSearch:
                 machine=self.machine,
                 say=self.say,
             )
-        return found if found is not None and found.accepted else None
+            if found is None or not found.accepted:
+                return None
+            return self._without_needless(bench, found)
+
+    def _without_needless(self, bench: Bench, found: Attribution) -> FoundLaw:
+        """``found`` and the effects that it does not make needless: what imitated the law passed before it was there.
+
+        A law that is only described stands beside all of them.
+        """
+        if not self.spec.empirical or not self.accepted:
+            return FoundLaw(found, self.accepted)
+        self.say("testing the effects beside the law")
+        weights, factors = ChannelWeights(bench), bench.factors("validate")
+        weights.base_held = found.base_validate * factors
+        together = [*self.accepted, *found.accepted]
+        kept, final, held, notes = prune(
+            bench, self.declared, weights, together, found.final, found.final_validate * factors
+        )
+        terms = replace(
+            found,
+            accepted=tuple(s for s in kept if s in found.accepted),
+            final=final,
+            final_validate=weights.plain(held, "validate"),
+            notes=(*found.notes, *notes),
+        )
+        return FoundLaw(terms, tuple(s for s in kept if s in self.accepted))
 
     def _unknowns(self) -> Unknowns:
         """Declared parameters about the drawing, the accepted effects' from where they were identified."""

@@ -1,5 +1,6 @@
 """The command line around the studies: help, versions, one sentence per mistake, never a traceback."""
 
+import gc
 import os
 import shlex
 import subprocess
@@ -249,3 +250,15 @@ def test_a_command_computes_with_one_thread_unless_the_user_sets_more(given: dic
     if found == "set()":
         pytest.skip("NumPy does not use OpenBLAS here")
     assert found == f"{{{min(threads, os.cpu_count() or 1)}}}"
+
+
+def test_full_collections_are_rare_in_a_command() -> None:
+    program = (
+        "import atexit, gc; from thsa_cosim.cli import main\n"
+        "atexit.register(lambda: print(gc.get_threshold())); main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, "--version"], capture_output=True, text=True, timeout=60, check=True
+    )
+    young, middle, _ = gc.get_threshold()
+    assert done.stdout.splitlines()[-1] == str((young, middle, 100))

@@ -1,10 +1,15 @@
 """An event of the machine is seen by several sensors, a defect by one: impacts, dead bands, and what imitates them."""
 
+from dataclasses import replace
+from functools import cached_property
+
 import numpy as np
 import pytest
 
 from thsa_cosim.inspection.channel import Channel
 from thsa_cosim.inspection.recording import inspect_channels
+from thsa_cosim.recordings.independence import independence
+from thsa_cosim.recordings.noise import noise_estimate
 from thsa_cosim.signals import FloatArray
 
 TIME = np.arange(4000) * 2e-3
@@ -79,3 +84,28 @@ def test_a_current_that_jumps_with_its_voltage_is_the_controllers() -> None:
 def test_joined_recordings_are_no_event_of_the_machine(without: tuple[str, ...]) -> None:
     own = {n: (np.concatenate((v[:1000], v[2500:], v[1000:2500])), u) for n, (v, u) in waking().items()}
     assert ("i", "step") in told({n: s for n, s in own.items() if n not in without})
+
+
+def test_facts_that_were_found_before_the_events_are_those_of_a_new_channel() -> None:
+    values, unit = bouncing()["F"]
+    values[::400] = 32767.0  # codes, which every fact has to leave out
+    known = Channel("r", "F", unit, "output", TIME, values)
+    facts = [name for name in vars(Channel) if isinstance(vars(Channel)[name], cached_property)]
+    for fact in facts:
+        getattr(known, fact)
+    events, shared = TIME[list(IMPACTS)], TIME[[100]]
+    found, fresh = known.with_events(events, shared), replace(known, commanded=events, shared=shared)
+    assert found.noise is known.noise  # not estimated again
+    assert np.any(found.answers != known.answers)
+    for fact in facts:
+        one, other = getattr(found, fact), getattr(fresh, fact)
+        if fact == "independence":
+            one, other = (one.kind, one.period, *one.fresh), (other.kind, other.period, *other.fresh)
+        np.testing.assert_equal(one, other, err_msg=fact)
+
+
+def test_noise_is_the_same_with_independence_that_is_known_or_not() -> None:
+    rng = np.random.default_rng(5)
+    white = rng.normal(0.0, 0.1, 3000)
+    for values in (white, np.repeat(white[:600], 5), np.where(np.arange(3000) % 500 == 7, 32767.0, white)):
+        assert noise_estimate(values, known=independence(values)) == noise_estimate(values) > 0.0

@@ -1,7 +1,7 @@
 """One signal of a recording as detectors see it, with the facts that several of them need."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -31,6 +31,24 @@ _JUMP, _OFTEN = 0.02, 0.05
 """Change of a command from sample to sample, in shares of its range, that is a jump; share of samples that are none."""
 _ANSWER = 4.5
 """Samples after a jump of a command that may stand out: a voltage at a step of the speed."""
+_OWN_FACTS = (
+    "jumps",
+    "step",
+    "coded",
+    "plain",
+    "independence",
+    "noise",
+    "quantum",
+    "silent",
+    "drawn",
+    "profile",
+    "_alternates",
+    "steady",
+    "range",
+    "fresh_index",
+    "runs",
+)
+"""Facts that follow from the samples alone, whatever else happens in the recording."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +112,7 @@ class Channel:
     @cached_property
     def noise(self) -> float:
         """1 σ of the white noise, in ``unit``; 0 if none can be seen."""
-        return noise_estimate(self.plain)
+        return noise_estimate(self.plain, known=self.independence)
 
     @cached_property
     def quantum(self) -> float:
@@ -186,6 +204,13 @@ class Channel:
         changes = np.flatnonzero(np.diff(self.plain) != 0.0) + 1
         starts = np.concatenate(([0], changes))
         return starts, np.diff(np.concatenate((starts, [self.values.size])))
+
+    def with_events(self, commanded: FloatArray, shared: FloatArray) -> "Channel":
+        """Return the channel with these times; what does not depend on them is not found anew."""
+        found = replace(self, commanded=commanded, shared=shared)
+        facts = vars(self)
+        vars(found).update({name: facts[name] for name in _OWN_FACTS if name in facts})
+        return found
 
     def finding(
         self, kind: str, severity: Severity, text: str, where: Sequence[Span] = (), remedy: str = ""

@@ -25,10 +25,12 @@ def hum(channel: Channel) -> Iterator[Finding]:
         return  # with gaps and lost samples, the phase is lost
     grid = np.arange(channel.time[0], channel.time[-1], channel.step)
     values = np.interp(grid, channel.time, channel.clean)
+    bend = np.diff(values, 2)  # what is slow, and steps of the motion, would swamp the line
+    spectrum = np.abs(np.fft.rfft(bend * np.hanning(bend.size))) ** 2
     found = []
     for base in MAINS:
         for multiple in range(1, _HARMONICS + 1):
-            line = _line(values, base * multiple, channel)
+            line = _line(bend, spectrum, base * multiple, channel)
             if line is not None:
                 found.append((line, base * multiple))
     if not found:
@@ -41,13 +43,14 @@ def hum(channel: Channel) -> Iterator[Finding]:
     yield channel.finding("hum", "warning", text)
 
 
-def _line(values: FloatArray, frequency: float, channel: Channel) -> float | None:
-    """Amplitude of a line within 0.5 % of ``frequency``, if it is there in every part of the recording."""
+def _line(bend: FloatArray, spectrum: FloatArray, frequency: float, channel: Channel) -> float | None:
+    """Amplitude of a line within 0.5 % of ``frequency``, if it is there in every part of the recording.
+
+    ``bend`` (n,): second differences of the signal; ``spectrum``: their power.
+    """
     step = channel.step
-    if frequency * step > 0.45 or frequency * step * values.size < 30:
+    if frequency * step > 0.45 or frequency * step * (bend.size + 2) < 30:
         return None
-    bend = np.diff(values, 2)  # what is slow, and steps of the motion, would swamp the line
-    spectrum = np.abs(np.fft.rfft(bend * np.hanning(bend.size))) ** 2
     frequencies = np.fft.rfftfreq(bend.size, step)
     resolution = 2.5 / (bend.size * step)
     near = np.abs(frequencies - frequency) <= max(0.005 * frequency, resolution)

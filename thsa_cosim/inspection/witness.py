@@ -6,7 +6,6 @@ its own; and where recordings are joined, positions and speeds jump, too.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -41,8 +40,7 @@ def with_witnesses(channels: Sequence[Channel]) -> list[Channel]:
             others += list(kinks.values())
         times = np.unique(np.concatenate([np.empty(0), *others]))
         both = shared.get(channel.name, np.empty(0))
-        # A copy finds all of its facts anew.
-        found.append(replace(channel, commanded=times, shared=both) if times.size or both.size else channel)
+        found.append(channel.with_events(times, both) if times.size or both.size else channel)
     return found
 
 

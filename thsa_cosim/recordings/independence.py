@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thsa_cosim.recordings.outliers import row_medians
 from thsa_cosim.signals import FloatArray
 
 _LEAST_MARKS = 30
@@ -86,7 +87,7 @@ def _correlated(values: FloatArray) -> int | None:
         windows = bends[: bends.size // window * window].reshape(-1, window)
         if windows.shape[0] < 8:
             break
-        middles = np.median(windows, axis=1)
+        middles = row_medians(windows)
         middles = middles[middles > 0.0]
         if middles.size < max(6, 0.5 * windows.shape[0]):
             return None  # mostly at rest, or on a coarse lattice

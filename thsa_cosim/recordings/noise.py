@@ -14,7 +14,7 @@ quiet it looks: that is the floor.
 
 import numpy as np
 
-from thsa_cosim.recordings.independence import independence
+from thsa_cosim.recordings.independence import Independence, independence
 from thsa_cosim.recordings.outliers import far_values
 from thsa_cosim.signals import FloatArray
 
@@ -45,20 +45,23 @@ def quantum(values: FloatArray) -> float:
     return step if np.mean(off_lattice) <= 0.01 else 0.0
 
 
-def noise_estimate(values: FloatArray, *, smooth: bool = True) -> float:
+def noise_estimate(values: FloatArray, *, smooth: bool = True, known: Independence | None = None) -> float:
     """Return the standard deviation of the white noise on (n,) equally spaced ``values``, in their unit.
 
     0 means that no noise can be seen: fewer than 16 independent samples, or a signal that never changes.
-    ``smooth``: whether noise may be smooth, as :func:`independence`.
+    ``smooth``: whether noise may be smooth, as :func:`independence`. ``known``: its answer for these values, where a
+    caller has it already.
     """
     if values.size < _LEAST:
         return 0.0
     largest = float(np.max(np.abs(values)))
     if not np.isfinite(largest) or largest > 1e150:
         return 0.0
-    values = values[~far_values(values)]
-    found = independence(values, smooth=smooth)
-    fresh = values[found.fresh] if found.kind else values
+    codes = far_values(values)
+    if known is None or codes.any():
+        values = values[~codes]
+        known = independence(values, smooth=smooth)
+    fresh = values[known.fresh] if known.kind else values
     fresh = _without_rest(fresh)
     return white_noise(fresh) if fresh.size >= _LEAST else 0.0
 

@@ -171,9 +171,10 @@ class Orthogonal:
         """(n, k) the unknowns' moves that imitate ``response`` (N, k) best."""
         return np.asarray(cho_solve(self._factor, (self._jacobian.T @ response).astype(float)))
 
-    def remaining(self, response: FloatArray) -> FloatArray:
-        """``response`` (N, k) less what the unknowns imitate."""
-        return np.asarray(response - self._jacobian @ self.project(response).astype(np.float32))
+    def remaining(self, response: FloatArray, moves: FloatArray | None = None) -> FloatArray:
+        """``response`` (N, k) less what the unknowns imitate, by its ``moves`` (n, k) where they are known."""
+        moves = self.project(response) if moves is None else moves
+        return np.asarray(response - self._jacobian @ moves.astype(np.float32))
 
     def products(self, responses: Sequence[FloatArray]) -> FloatArray:
         """(K, K) products of what remains of ``responses`` (N, k) each, side by side; a block of rows at a time."""
@@ -207,7 +208,7 @@ def _propose(
     base: Fit, orthogonal: Orthogonal, candidate: Candidate, shapes: Mapping[str, float], response: FloatArray
 ) -> Proposal:
     moved = orthogonal.project(response)
-    left = orthogonal.remaining(response)
+    left = orthogonal.remaining(response, moved)
     whole = np.asarray(response.T @ response, dtype=float)
     precision = np.asarray(left.T @ left, dtype=float)
     pull = -np.asarray(left.T @ base.residual, dtype=float)

@@ -4,6 +4,7 @@ Blocks of a fraction of a second are summed without regard to phase, since close
 (Lomb, Astrophysics and Space Science 39 (1976) 447, for unevenly spaced points).
 """
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -98,5 +99,9 @@ def _waves(grid: FloatArray, place: FloatArray) -> np.ndarray:
     waves = np.empty((grid.size, place.size), dtype=complex)
     waves[0] = np.exp(-1j * grid[0] * place)
     if grid.size > 1:
-        waves[1:] = np.exp(-1j * (grid[1] - grid[0]) * place)
-    return np.cumprod(waves, axis=0, out=waves)
+        turn = np.exp(-1j * (grid[1] - grid[0]) * place)
+        for before, after in itertools.pairwise(
+            waves
+        ):  # a seventh of the time of cumprod, which goes down columns
+            np.multiply(before, turn, out=after)
+    return waves

@@ -116,9 +116,10 @@ def stuck_mask(channel: Channel) -> Mask:
     repeats = min(0.9, 1.0 - float(np.sum(short)) * period / usual)
     limit = period * max(_LEAST_STUCK, 3.0 * np.log(channel.values.size) / -np.log(max(repeats, 0.05)))
     extremes = (channel.clean.min(), channel.clean.max())
-    for first, length in zip(starts.tolist(), lengths.tolist(), strict=True):
+    long = lengths > limit
+    for first, length in zip(starts[long].tolist(), lengths[long].tolist(), strict=True):
         at_limit = channel.plain[first] in extremes and not _stays(channel, first, length)
-        if length > limit and not at_limit:
+        if not at_limit:
             mask[first : first + length] = True
     return mask
 

@@ -25,7 +25,7 @@ def proposal(effect: str, gain: float, place: str = "motor") -> Any:
         coefficients=(None,),
         shapes=(),
     )
-    return SimpleNamespace(candidate=candidate, gain=gain, label=f"{effect}:{place}")
+    return SimpleNamespace(candidate=candidate, gain=gain, label=f"{effect}:{place}", shapes={})
 
 
 def test_the_best_two_starts_of_the_best_six_effects_are_refined():
@@ -229,6 +229,18 @@ def test_further_starts_are_refined_that_promise_more_than_all_before(
     small = Fits(monkeypatch, selection)
     selection.refined_further([], [proposal("a", 0.5)], [proposal("a", 0.6)], 0.1)
     assert small.tried == ["a0.6"]
+
+
+def test_a_start_that_a_search_came_by_twice_is_fitted_once(
+    selection: Selection, monkeypatch: pytest.MonkeyPatch
+):
+    fits = Fits(monkeypatch, selection, a=(100.0, 1.0), b=(50.0, 1.0))
+    speeds = {120.0: 2e-3, 119.0: 2e-3 * (1.0 + 1e-15), 118.0: 2.01e-3}
+    further = [proposal("a", 120.0), proposal("a", 119.0), proposal("b", 118.0), proposal("b", 117.0)]
+    for p in further:
+        p.shapes = {"v_S": speeds.get(p.gain, 2.02e-3)}
+    selection.refined_further([], [proposal("a", 100.0), proposal("b", 100.0)], further, 17.0)
+    assert fits.tried == ["a120", "b118", "b117"]
 
 
 def test_what_is_seen_beside_an_effect_is_part_of_its_evidence(selection: Selection):

@@ -68,6 +68,14 @@ def worth_refining(proposals: Sequence[Proposal], limit: float) -> list[Proposal
     return chosen
 
 
+def each_start_once(proposals: Sequence[Proposal]) -> list[Proposal]:
+    """``proposals`` without those that another one begins at: a search around a point comes by that point again."""
+    found: dict[tuple[str, tuple[str, ...]], Proposal] = {}
+    for p in proposals:
+        found.setdefault((p.candidate.key, tuple(f"{name} {x:.9g}" for name, x in p.shapes.items())), p)
+    return list(found.values())
+
+
 def other_places(winner: Proposal, proposals: Sequence[Proposal]) -> list[Proposal]:
     """The best proposal of the winner's effect in every other place that promises nearly as much."""
     found: dict[str, Proposal] = {}
@@ -198,6 +206,7 @@ class Selection:
         for p in proposals:
             before[p.candidate.key] = max(before.get(p.candidate.key, 0.0), p.gain)
         better = worth_refining([p for p in further if p.gain > BETTER * before[p.candidate.key]], limit)
+        better = each_start_once(better)
         chosen = sorted([*better, *other_waves(proposals, scored)], key=lambda p: -p.gain)
         found = sorted([*scored, *self.fitted(chosen)], key=lambda s: -s.held_out_gain)
         return simplest_first(found, self._ties)

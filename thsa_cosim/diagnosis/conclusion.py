@@ -13,7 +13,6 @@ from thsa_cosim.diagnosis.blackbox.prepare import BlackBox
 from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
-from thsa_cosim.diagnosis.catalogue.effect import Effect
 from thsa_cosim.diagnosis.catalogue.extend import write_extended_model
 from thsa_cosim.diagnosis.choosing.attribution import Attribution
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence

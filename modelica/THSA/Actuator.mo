@@ -37,7 +37,7 @@ model Actuator "THSA in closed velocity loop, every loss a law over temperature"
     "Slot: friction and torques at the gearbox's output shaft";
   replaceable THSA.Effects.NoTorque shaftEffect constrainedby THSA.Interfaces.ShaftEffect
     "Slot: torques at the screw's shaft";
-  replaceable THSA.Effects.NoContact contactEffect constrainedby THSA.Interfaces.ContactEffect
+  replaceable THSA.Effects.NoContact contactEffect constrainedby THSA.Interfaces.ContactEffect(t_d=screw.d_s/screw.k_s)
     "Slot: contact of screw and nut";
   replaceable THSA.Effects.NoFriction screwEffect(v(unit="m/s"), z(unit="m"), N(unit="N"), F(unit="N"))
     constrainedby THSA.Interfaces.FrictionEffect

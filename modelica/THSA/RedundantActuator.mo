@@ -62,11 +62,11 @@ model RedundantActuator "THSA with two motor lanes, active and standby, and two 
     "Slot: sensor of the current of lane B [A], which its loop uses";
   replaceable THSA.Effects.NoFriction gearboxEffect(v(unit="rad/s"), z(unit="rad"), N(unit="N.m"), F(unit="N.m")) constrainedby THSA.Interfaces.FrictionEffect
     "Slot: friction and torques at the gearbox's output shaft";
-  replaceable THSA.Effects.NoContact contactPrimaryEffect constrainedby THSA.Interfaces.ContactEffect
+  replaceable THSA.Effects.NoContact contactPrimaryEffect constrainedby THSA.Interfaces.ContactEffect(t_d=primary.d_s/primary.k_s)
     "Slot: contact of screw and nut of the primary load path";
   replaceable THSA.Effects.NoFriction screwPrimaryEffect(v(unit="m/s"), z(unit="m"), N(unit="N"), F(unit="N")) constrainedby THSA.Interfaces.FrictionEffect
     "Slot: friction of the primary load path's nut";
-  replaceable THSA.Effects.NoContact contactSecondaryEffect constrainedby THSA.Interfaces.ContactEffect
+  replaceable THSA.Effects.NoContact contactSecondaryEffect constrainedby THSA.Interfaces.ContactEffect(t_d=secondary.d_s/secondary.k_s)
     "Slot: contact of screw and nut of the secondary load path";
   replaceable THSA.Effects.NoFriction screwSecondaryEffect(v(unit="m/s"), z(unit="m"), N(unit="N"), F(unit="N")) constrainedby THSA.Interfaces.FrictionEffect
     "Slot: friction of the secondary load path's nut";

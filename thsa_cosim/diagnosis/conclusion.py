@@ -13,7 +13,6 @@ from thsa_cosim.diagnosis.blackbox.prepare import BlackBox
 from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
-from thsa_cosim.diagnosis.catalogue.effect import Effect
 from thsa_cosim.diagnosis.catalogue.extend import write_extended_model
 from thsa_cosim.diagnosis.choosing.attribution import Attribution
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
@@ -243,7 +242,6 @@ class Conclusion:
         if not _tested(found):
             yield _untested(found, self.effects)
         yield from off_the_drawing(extended.identified.fit)
-        yield from doubts(s.candidate.effect for s in found.accepted)
         if extended.model is not None and extended.fmu is not None:
             again = export_command(extended.model, self.spec.package, extended.fmu)
             yield f"{extended.fmu.name} is for {native_platform().fmi3} only; {again} compiles it for all platforms"
@@ -252,13 +250,6 @@ class Conclusion:
 def export_command(model: object, package: object, fmu: object) -> str:
     """The command that exports ``model`` to ``fmu``, as a shell takes it, whatever is in its paths."""
     return shlex.join(map(str, ("thsa-cosim", "export", model, "--package", package, "-o", fmu)))
-
-
-def doubts(effects: Iterable[Effect]) -> Iterator[str]:
-    """What the laws of the effects that were found simplify, a sentence of each."""
-    for effect in dict.fromkeys(effects):
-        if effect.doubt:
-            yield f"{effect.name}: {effect.doubt}"
 
 
 def _built(

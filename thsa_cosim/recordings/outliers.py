@@ -68,7 +68,7 @@ def running_median(values: FloatArray, width: int = 5) -> FloatArray:
 
 
 def row_medians(rows: FloatArray) -> FloatArray:
-    """Return the median of each row of (n, m), NaN where one is NaN: as numpy.median, which takes ten times as long."""
+    """Return the median of each row of (n, m), NaN where one is NaN: numpy.median, which takes longer for many rows."""
     ordered = np.sort(rows, axis=-1)
     m = ordered.shape[-1]
     middle = ordered[:, m // 2] if m % 2 else 0.5 * (ordered[:, m // 2 - 1] + ordered[:, m // 2])

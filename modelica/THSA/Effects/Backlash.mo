@@ -10,9 +10,13 @@ initial equation
   o = s_0*gap/2*(if delta > 0 then 1 elseif delta < 0 then -1 else 0);
 equation
   der(o) = 0;
-  e = if delta + o > h then o - h elseif delta + o < -h then o + h else -c*delta;
-  v_e = if delta + o > h or delta + o < -h then 0 else -c*v_s;
+  e = if delta + o > h then (if delta + o - h + t_d*v_s > 0 then o - h else -c*delta)
+    elseif delta + o < -h then (if delta + o + h + t_d*v_s < 0 then o + h else -c*delta) else -c*delta;
+  v_e = if delta + o > h then (if delta + o - h + t_d*v_s > 0 then 0 else -c*v_s)
+    elseif delta + o < -h then (if delta + o + h + t_d*v_s < 0 then 0 else -c*v_s) else -c*v_s;
   k_e = 0;
   annotation(Documentation(info="<html><p>Dead zone of width gap in the deflection of the contact. At rest under a load one
-flank carries, s_0 = 1; a nut that was released between the flanks starts with s_0 = 0.</p></html>"));
+flank carries, s_0 = 1; a nut that was released between the flanks starts with s_0 = 0. A flank only pushes: as it parts, it lets go where stiffness
+and damping together would pull, as in <code>Modelica.Mechanics.Rotational.Components.ElastoBacklash</code>; with t_d = 0, where a
+model does not say what its contact's damping is, the damping acts until the flank has parted.</p></html>"));
 end Backlash;

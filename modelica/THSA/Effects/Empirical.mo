@@ -9,7 +9,6 @@ block Empirical "Terms in speed, position, distance and load, for what no effect
   parameter Real k_zs = 0 "Coefficient of z sgn(v)";
   parameter Real k_zzs = 0 "Coefficient of z^2 sgn(v)";
   parameter Real k_zv = 0 "Coefficient of z v";
-  parameter Real k_N = 0 "Coefficient of N";
   parameter Real k_Ns = 0 "Coefficient of |N| sgn(v)";
   parameter Real k_Nv = 0 "Coefficient of |N| v";
   parameter Real k_NNs = 0 "Coefficient of N^2 sgn(v)";
@@ -23,11 +22,11 @@ block Empirical "Terms in speed, position, distance and load, for what no effect
   parameter Real k_sin = 0 "Coefficient of sin(w z)";
   parameter Real k_cos = 0 "Coefficient of cos(w z)";
   parameter Real w = 1 "Wave number";
-  Real d(start=0, fixed=true, nominal=1e-2) "Distance travelled";
+  Real d(start=0, fixed=true, nominal=1e-2) "Distance travelled; at rest where no term has it";
 equation
-  der(d) = noEvent(abs(v));
+  der(d) = if k_d > 0 or k_d < 0 then noEvent(abs(v)) else 0;
   F = k_1 + (k_vv*v*s + k_vvv*v^2)*v + (k_z + k_zz*z + (k_zs + k_zzs*z)*s + k_zv*v)*z
-    + k_N*N + (k_Ns*s + k_Nv*v)*noEvent(abs(N)) + k_NNs*N^2*s + k_a*noEvent(abs(v))
+    + (k_Ns*s + k_Nv*v)*noEvent(abs(N)) + k_NNs*N^2*s + k_a*noEvent(abs(v))
     + (if k_f > 0 or k_f < 0 then k_f*exp(-noEvent(abs(v))/v_f)*s else 0)
     + (if k_g > 0 or k_g < 0 then k_g*exp(-(v/v_f)^2)*s else 0)
     + (if k_h > 0 or k_h < 0 then k_h/(1 + (v/v_f)^2)*s else 0)

@@ -4,6 +4,7 @@ partial block ContactEffect "Effect in the contact of screw and nut"
   THSA.Interfaces.RealInput w(unit="rad/s") "Speed of the screw";
   THSA.Interfaces.RealInput delta(unit="m") "Deflection of the contact without the effect";
   THSA.Interfaces.RealInput v_s(unit="m/s") "Its rate";
+  input Real t_d(unit="s") = 0 "Damping over stiffness of the contact; 0 where the model does not give it";
   THSA.Interfaces.RealOutput e(unit="m") "Added deflection";
   THSA.Interfaces.RealOutput v_e(unit="m/s") "Its rate";
   THSA.Interfaces.RealOutput k_e(unit="m/rad") "Its change with the screw's angle";

@@ -207,6 +207,20 @@ def test_backlash_is_the_width_of_the_hysteresis(superset: Plant):
         assert wide - width({}) == pytest.approx(gap, rel=1e-3)
 
 
+def test_flanks_of_a_backlash_push_and_do_not_pull(superset: Plant):
+    half, k_s, d_s = 1e-4, rig().k_s, rig().d_s
+    names = ("screw.F_s", "screw.delta", "screw.v_s")
+    inputs = {"v_cmd": COMMAND, "F_load": np.zeros(TIME.size), "T_amb": np.full(TIME.size, TEMPERATURE)}
+    values = {"contactEffect.backlash.gap": 2.0 * half}
+    found = superset.run(values, Signals(TIME, inputs), names, TIME, tolerance=1e-9)
+    force, delta, rate = (found[name] for name in names)
+    ahead = k_s * (delta - half) + d_s * rate
+    behind = k_s * (delta + half) + d_s * rate
+    expected = np.where(delta > half, np.fmax(ahead, 0.0), np.where(delta < -half, np.fmin(behind, 0.0), 0.0))
+    assert np.min(ahead[delta > half]) < -10.0, "parting flanks would pull"
+    np.testing.assert_allclose(force, expected, atol=1.0)
+
+
 @pytest.mark.parametrize("load", [-2e4, 2e4])
 def test_backlash_that_the_load_has_taken_up_starts_at_rest(superset: Plant, load: float):
     still = np.zeros(TIME.size)

@@ -123,5 +123,3 @@ class Effect:
     variants: tuple[Variant, ...]
     part: Literal["screw"] | None = None
     """Offered only to machines that have this part."""
-    doubt: str = ""
-    """What the law simplifies that other parameters have to take up; said wherever the effect is found."""

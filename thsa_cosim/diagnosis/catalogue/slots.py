@@ -24,7 +24,7 @@ INPUTS: Mapping[str, tuple[str, ...]] = {
     "PhaseEffect": ("i_q", "phi"),
 }
 #: Further inputs that a model need not give, since they have a default: passed on as modifiers, not as equations.
-OPTIONAL: Mapping[str, tuple[str, ...]] = {"VoltageEffect": ("phi",)}
+OPTIONAL: Mapping[str, tuple[str, ...]] = {"VoltageEffect": ("phi",), "ContactEffect": ("t_d",)}
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "FrictionEffect": ("F",),
     "ShaftEffect": ("tau",),

@@ -100,8 +100,7 @@ def _waves(grid: FloatArray, place: FloatArray) -> np.ndarray:
     waves[0] = np.exp(-1j * grid[0] * place)
     if grid.size > 1:
         turn = np.exp(-1j * (grid[1] - grid[0]) * place)
-        for before, after in itertools.pairwise(
-            waves
-        ):  # a seventh of the time of cumprod, which goes down columns
+        # Row by row: a seventh of the time of cumprod, which goes down columns.
+        for before, after in itertools.pairwise(waves):
             np.multiply(before, turn, out=after)
     return waves

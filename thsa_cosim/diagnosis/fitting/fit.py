@@ -161,8 +161,9 @@ def refine(
     """Minimise the fit recordings' squared residuals from ``vector`` (n,).
 
     ``jacobian`` (N, n) is used as given at the start; in later iterations the columns ``fresh`` (default all) are
-    taken anew. Stops when a step promises or brings less than ``enough``, or so little that the cost ``to_beat``,
-    reached elsewhere, is HOPELESS steps away. None if the start cannot be simulated.
+    taken anew. Stops when a step promises or brings less than ``enough`` mean squares of what is left (at least of the
+    noise), or so little that the cost ``to_beat``, reached elsewhere, is HOPELESS steps away. None if the start cannot
+    be simulated.
     """
     n = len(unknowns.members)
     vector = unknowns.clip(vector)
@@ -181,8 +182,9 @@ def refine(
             jacobian[:, renew] = new
         state = Fit(unknowns, vector, residual, jacobian, steps, cost, converged)
         better, promised, damping = _step(bench, state, damping)
+        least = enough * state.inflation
         if better is None:
-            if promised < enough:
+            if promised < least:
                 converged = True
                 break
             if response is not None:
@@ -194,7 +196,7 @@ def refine(
         response, stale = None, True
         if cost - HOPELESS * max(gained, promised) > to_beat:
             break
-        if gained < enough:
+        if gained < least:
             converged = True
             break
     return Fit(unknowns, vector, residual, jacobian, steps, cost, converged)

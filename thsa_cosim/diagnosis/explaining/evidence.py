@@ -6,7 +6,7 @@ that the measured residual depends on most is called its cause: the largest corr
 Methods for Research Workers, 1925).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,7 +70,7 @@ def _over_cause(
     measured = np.concatenate([g.measured for g in groups])
     causes = {name: np.concatenate([g.causes[name] for g in groups]) for name in groups[0].causes}
     ratios = {name: _ratio(x, measured) for name, x in causes.items()}
-    left = next(iter(formulas_of(scenario, spec)[0].names), "")
+    left = _first(spec.left, formulas_of(scenario, spec)[0].names)
     cause = max(ratios, key=lambda name: ratios[name])
     per_value = 1.0 / (2.0 * spec.band * groups[0].step)  # samples to an independent value
     bins = _bins(
@@ -80,6 +80,11 @@ def _over_cause(
         return None
     unit = "s" if cause == "time" else _unit(scenario, cause)
     return Evidence(spec.name, spec.unit, left, part, cause, unit, ratios[cause], *bins)
+
+
+def _first(text: str, names: Collection[str]) -> str:
+    """The one of ``names`` that a formula's text begins with, the same in every run; "" if there is none."""
+    return min(names, key=lambda name: (text.find(name), -len(name)), default="")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 """The screening against least squares: what a candidate would do, less what the declared parameters can imitate."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -202,6 +203,13 @@ def test_what_the_declared_parameters_imitate_wholly_promises_nothing(monkeypatc
     assert (found.gain, found.amplitudes[0]) == (0.0, 0.0)
     (held,) = proposed(candidate(parameter("a")), fit=base(spread=1e-3))
     assert held.remaining > 0.5, "unless the drawing holds one of them"
+
+
+def test_responses_that_are_alike_have_standard_errors_whatever_rounding_makes_of_their_products():
+    (found,) = proposed(candidate(parameter("a"), parameter("b")))
+    alike = 2.0 * (1.0 + 1e-5)  # as products of single precision come out: indefinite
+    found = replace(found, precision=np.array([[4.0, alike], [alike, 1.0]]))
+    np.testing.assert_allclose(found.stderr, [0.25, 0.5], rtol=1e-4)
 
 
 def test_a_summary_keeps_all_but_the_response():

@@ -50,8 +50,10 @@ class Proposal:
         size = np.sqrt(np.diag(self.precision))
         if not size.all():
             return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), np.inf)
-        inverse = np.linalg.pinv(self.precision / np.outer(size, size), rcond=TESTABLE, hermitian=True)
-        return np.asarray(np.sqrt(np.diag(inverse)) / size)
+        # of single precision, products of responses that are alike can have a negative eigenvalue, which says nothing
+        values, vectors = np.linalg.eigh(self.precision / np.outer(size, size))
+        known = values > TESTABLE * values[-1]
+        return np.asarray(np.sqrt(np.sum(vectors[:, known] ** 2 / values[known], axis=1)) / size)
 
     @property
     def is_testable(self) -> bool:

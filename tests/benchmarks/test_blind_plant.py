@@ -16,6 +16,7 @@ from blind_effects import CATALOGUE, combined
 from blind_outside import OUTSIDE
 from blind_plant import Undeclared, Wave, declared, simulate
 from blind_schedules import PARTS, schedule
+from blind_steps import advance, advance_declared
 from blind_units import EFFECTS, FLOOR, NOISE, STRENGTHS, Visibility, generate_unit, overall, unit_rig
 
 SHARED = Path(__file__).parents[3] / "shared"
@@ -61,6 +62,21 @@ def test_recorded_rig_is_this_plant() -> None:
     for name, (column, factor) in COLUMNS.items():
         residual = found[name] - table[column].to_numpy(float) * factor
         assert np.sqrt(np.mean(residual**2)) < 1.03 * FLOOR[name], name
+
+
+def test_loop_without_effects_is_the_loop_with_none() -> None:
+    """Where a gap of no width is closed does not matter, but asks for the loop that knows effects."""
+    clean, found = run(), run(gap_closed=1.0)
+    for name, noise in NOISE.items():
+        assert np.abs(found[name] - clean[name]).max() < 1e-6 * noise, name
+
+
+def test_compiled_loops_are_kept_for_the_next_process() -> None:
+    """Each worker of the benchmark is a fresh process, and compiling costs as much as a unit or two."""
+    run()
+    run(gap_closed=1.0)
+    for loop in (advance, advance_declared):
+        assert sum((*loop.stats.cache_hits.values(), *loop.stats.cache_misses.values())) == 1
 
 
 def test_stuck_parts_do_not_move_at_all() -> None:

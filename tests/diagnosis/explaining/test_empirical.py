@@ -111,7 +111,7 @@ def beside_a_law(true: dict[str, float], *, added: bool = True) -> tuple[FoundLa
     )
     found = Attribution(
         term.fit, 0.0, (), (term,), final,
-        weights.plain(weights.base_held, "validate"), weights.plain(held, "validate"),
+        weights.plain(weights.base_held, "validate"), weights.plain(held, "validate"), own.factors("fit"),
     )  # fmt: skip
     asked: Any = SimpleNamespace(empirical=added)
     none: Any = None

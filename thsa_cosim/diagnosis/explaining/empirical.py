@@ -34,13 +34,13 @@ from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified
-from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
+from thsa_cosim.diagnosis.fitting.trials import Trial, for_search
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.diagnosis.results import EmpiricalLaw, EmpiricalTerm, Value
 from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
 
-#: At most so many terms: a law of more says no more than a plot.
+#: At most so many terms: a law of more says no more than a plot. One that is only described has the most telling one.
 _TERMS = 3
 
 
@@ -216,7 +216,7 @@ class LawSearch:
         beside = source_beside(self.spec.model, self.spec.package)
         source = extended_class(name, base, [*own, *terms], shapes, beside=beside)
         fmu = export_kept(self.folder, name, source, self.spec.package)
-        trials = with_fmu(self.trials, fmu)
+        trials = for_search(self.trials, fmu)
         cases = [t.case for t in trials if t.part == "fit"]
         opening = partial(self.open_runner, simulation)
         scales = scales_of(fmu, slots, cases, opening)
@@ -232,10 +232,11 @@ class LawSearch:
                 unknowns,
                 candidates,
                 scan,
-                start=self.after.fit.at(unknowns.names),
+                start=self.after.fit,
                 seed=self.scenario.seed,
-                most=_TERMS,
+                most=_TERMS if self.spec.empirical else 1,
                 machine=self.machine,
+                deep=self.spec.empirical,
                 say=self.say,
             )
             if found is None or not found.accepted:

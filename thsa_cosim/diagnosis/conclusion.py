@@ -53,6 +53,8 @@ from thsa_cosim.study import Comparison, CouplingError, Study, coupling_error, r
 
 #: The folder of the superset inside a study.
 WORK = "superset"
+#: A search's fit of the declared model is a better optimum if its cost is less by this: three standard errors, squared.
+BETTER = 9.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,24 +181,24 @@ class Conclusion:
     def _declared(self) -> Identified:
         """The declared model, identified once more if the search came to a better optimum than the drawing led to."""
         base = self.found.base
-        if self.found.base_cost > self.before.fit.cost - 1.0:
+        before = self.before.fit
+        if self.found.base_cost > before.cost - BETTER * before.inflation:
             return self.before
         self.study.place.say("identifying the declared model, starting from the result of the search")
         return self._identify(self.before.fmu, self.unknowns, [self.before.fit.vector, base.vector], ())
 
     def _extended(self, declared: Identified) -> _Model:
         """The model with the accepted effects on its own FMU; the declared one where none was accepted."""
-        accepted, final = self.found.accepted, self.found.final
+        accepted, final = self.found.accepted, self.found.plain_final
         if not accepted:
             return _Model(declared)
         model = fmu = wrapper = None
         wider = extended_unknowns(self.unknowns, accepted)
-        hint = final.at(wider.names)
         if self.box is None:
             self.study.place.say(f"exporting the model with {', '.join(s.candidate.name for s in accepted)}")
             model, fmu = self._written(accepted, final)
         self.study.place.say("identifying the extended model from the drawing")
-        after = self._identify(fmu or declared.fmu, wider, [wider.at_drawing(hint), hint], accepted)
+        after = self._identify_near(final, fmu or declared.fmu, wider, accepted)
         if self.box is not None:
             values = {**after.trials[0].case.fixed, **after.fit.unknowns.named(after.fit.vector)}
             wrapper = write_wrapper(self.study.folder, self.scenario.fmu.path, self.box.wrapper, values)
@@ -212,11 +214,10 @@ class Conclusion:
 
     def _with_law(self, law: FoundLaw) -> _Model:
         """The model with an empirical law and the effects that are still needed."""
-        added, final = (*law.effects, *law.terms.accepted), law.terms.final
+        added, final = (*law.effects, *law.terms.accepted), law.terms.plain_final
         model, fmu = self._written(added, final)
         wider = extended_unknowns(self.unknowns, added)
-        hint = final.at(wider.names)
-        return _Model(self._identify(fmu, wider, [wider.at_drawing(hint), hint], added), model, fmu)
+        return _Model(self._identify_near(final, fmu, wider, added), model, fmu)
 
     def _written(self, accepted: Sequence[Scored], final: Fit) -> tuple[Path, Path]:
         """Class and FMU of the model with the effects ``accepted``."""
@@ -224,13 +225,27 @@ class Conclusion:
         built = _built(self.known, accepted, final)
         return write_extended_model(self.study.folder, self.spec.model, self.spec.package, *built)
 
+    def _identify_near(
+        self, final: Fit, fmu: Path, unknowns: Unknowns, accepted: Sequence[Scored]
+    ) -> Identified:
+        """``unknowns`` from the drawing and from where the search ended."""
+        hint = final.at(unknowns.names)
+        return self._identify(fmu, unknowns, [unknowns.at_drawing(hint), hint], accepted, final)
+
     def _identify(
-        self, fmu: Path, unknowns: Unknowns, starts: Sequence[np.ndarray], accepted: Sequence[Scored]
+        self,
+        fmu: Path,
+        unknowns: Unknowns,
+        starts: Sequence[np.ndarray],
+        accepted: Sequence[Scored],
+        near: Fit | None = None,
     ) -> Identified:
         trials = self.trials
         if self.box is not None:
             trials = with_wrapper(trials, self.box.wrapper, fixed_shapes(accepted))
-        return identify_model(fmu, trials, unknowns, starts, self.scenario.simulation, self.study.open_runner)
+        return identify_model(
+            fmu, trials, unknowns, starts, self.scenario.simulation, self.study.open_runner, near
+        )
 
     def _notes(self, extended: _Model, found: Attribution) -> Iterator[str]:
         """What a reader of the result should know: sentences."""

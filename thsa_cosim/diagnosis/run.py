@@ -22,9 +22,9 @@ from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
 from thsa_cosim.diagnosis.fitting.identified import identify_model
 from thsa_cosim.diagnosis.fitting.trials import (
     Trial,
+    for_search,
     spec_of,
     trials_of,
-    with_fmu,
     with_wrapper,
 )
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, declared_unknowns_of
@@ -83,7 +83,7 @@ def _diagnose(
     else:
         say("exporting the superset of all effects")
         box, tested = None, open_superset(scenario, spec.model, cases, effects, study.folder / WORK, opening)
-        declared, driven = trials, with_fmu(trials, tested.fmu)
+        declared, driven = trials, for_search(trials, tested.fmu)
         if spec.known:
             known = declared_effects(tested.candidates, spec.known, f"{scenario.path}: diagnose.known")
             unknowns = unknowns.with_members(declared_unknowns_of(known))
@@ -105,8 +105,9 @@ def _diagnose(
         signals_at = tested.signals_at if isinstance(tested, BlackBox) else partial(tested.signals_at, runner)
         given = {variable: value for effect in known for variable, value in effect.given.items()}
         bench = Bench(runner, driven, {**held_shapes(tested.candidates), **given})
-        start = before.fit.vector
-        at_start = {t.case.name: unknowns.assignments(start, t.group) for t in driven if t.part == "fit"}
+        at_start = {
+            t.case.name: unknowns.assignments(before.fit.vector, t.group) for t in driven if t.part == "fit"
+        }
         machine = machine_of(tested.slots, signals_at(at_start))
         scan = wave_number_finder(bench, tested.slots, signals_at, machine)
         found = attribute(
@@ -114,7 +115,7 @@ def _diagnose(
             unknowns,
             tested.candidates,
             scan,
-            start=start,
+            start=before.fit,
             seed=scenario.seed,
             most=spec.most,
             machine=machine,

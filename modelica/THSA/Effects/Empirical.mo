@@ -2,7 +2,9 @@ within THSA.Effects;
 block Empirical "Terms in speed, position, distance and load, for what no effect with a name explains"
   extends THSA.Interfaces.FrictionEffect;
   parameter Real k_1 = 0 "Coefficient of 1";
-  parameter Real k_vv = 0 "Coefficient of v |v|";
+  parameter Real k_vv = 0 "Coefficient of v |v|, at the speed v_r if the exponent is not 2";
+  parameter Real n(unit="1", min=1, max=4) = 2 "Exponent";
+  parameter Real v_r(min=1e-9) = 1 "Speed at which powers of all exponents are the same";
   parameter Real k_vvv = 0 "Coefficient of v^3";
   parameter Real k_z = 0 "Coefficient of z";
   parameter Real k_zz = 0 "Coefficient of z^2";
@@ -25,7 +27,8 @@ block Empirical "Terms in speed, position, distance and load, for what no effect
   Real d(start=0, fixed=true, nominal=1e-2) "Distance travelled; at rest where no term has it";
 equation
   der(d) = if k_d > 0 or k_d < 0 then noEvent(abs(v)) else 0;
-  F = k_1 + (k_vv*v*s + k_vvv*v^2)*v + (k_z + k_zz*z + (k_zs + k_zzs*z)*s + k_zv*v)*z
+  F = k_1 + (if k_vv > 0 or k_vv < 0 then k_vv*v^2*((v^2 + 1e-12*v_r^2)/v_r^2)^((n - 2)/2)*s else 0) + k_vvv*v^3
+    + (k_z + k_zz*z + (k_zs + k_zzs*z)*s + k_zv*v)*z
     + (k_Ns*s + k_Nv*v)*noEvent(abs(N)) + k_NNs*N^2*s + k_a*noEvent(abs(v))
     + (if k_f > 0 or k_f < 0 then k_f*exp(-noEvent(abs(v))/v_f)*s else 0)
     + (if k_g > 0 or k_g < 0 then k_g*exp(-(v/v_f)^2)*s else 0)

@@ -64,13 +64,37 @@ def test_what_the_declared_model_leaves_is_given_in_standard_deviations_of_the_n
     np.testing.assert_allclose(windage.base.residual, fit * windage.rounds[0].factors)
 
 
+def test_the_final_fit_without_weights_is_that_of_a_bench_without_weights(windage: Attribution):
+    plain = windage.plain_final
+    own = bench(candidates(*NAMES), WINDAGE)
+    (residual,) = own.residuals(plain.unknowns, plain.vector[None, :], "fit")
+    np.testing.assert_allclose(plain.residual, residual)
+    np.testing.assert_allclose(plain.jacobian * windage.factors[:, None], windage.final.jacobian)
+
+
+def test_a_search_that_only_describes_is_no_deep_one(monkeypatch: pytest.MonkeyPatch):
+    offered = candidates(*NAMES)
+
+    def never(*given: object) -> None:
+        raise AssertionError("no further starts, sizes, forms, places or rivals")
+
+    for name in ("further", "at_sizes", "elsewhere", "overtaking", "rivals"):
+        monkeypatch.setattr(f"thsa_cosim.diagnosis.choosing.selection.Selection.{name}", never)
+    found = attribute(bench(offered, WINDAGE), unknowns(), offered, lambda _: {}, seed=1, most=1, deep=False)
+    assert found is not None
+    assert [s.candidate.effect.name for s in found.accepted] == ["windage"]
+    assert found.rounds[0].rivals == found.rounds[0].forms == ()
+
+
 def test_the_search_starts_where_it_is_told_to_and_repeats_itself():
     offered = candidates("windage")
     own = bench(offered, WINDAGE)
-    start = 1.02 * np.array([1.5, 0.2, 0.4, 0.01])
+    vector = 1.02 * np.array([1.5, 0.2, 0.4, 0.01])
+    start = refine(bench(offered, WINDAGE), unknowns(), vector, iterations=1)
+    assert start is not None
     found = attribute(own, unknowns(), offered, lambda _: {}, start=start, seed=1)
     first = own._engine._runner.ran[0].values  # type: ignore[attr-defined]
-    assert [first[name] for name in unknowns().names] == pytest.approx(start)
+    assert [first[name] for name in unknowns().names] == pytest.approx(start.vector)
     again = [
         attribute(bench(offered, WINDAGE), unknowns(), offered, lambda _: {}, start=start, seed=seed)
         for seed in (1, 2)
@@ -136,7 +160,7 @@ def test_forms_of_one_effect_in_one_place_are_not_mixed():
 
 
 def test_a_second_effect_that_is_small_beside_the_first_is_found_where_it_explains_all_that_is_left():
-    found = diagnosed({**WINDAGE, **STRIBECK})
+    found = diagnosed({**WINDAGE, **STRIBECK, "motorEffect.stribeck.dF": 0.3})
     assert [s.candidate.effect.name for s in found.accepted] == ["stribeck", "windage"]
     alone, fitted = found.rounds[1].scored[0].share, found.accepted[1].share
     assert alone < 0.9 < fitted, "what the first one had taken up of it counts for it"

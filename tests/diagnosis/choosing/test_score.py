@@ -92,7 +92,9 @@ def test_a_fit_that_leaves_more_is_tried_from_the_drawing_too_and_the_better_one
     np.testing.assert_array_equal(
         given[2], [1.0, 4.0]
     )  # the declared one from the drawing, the effect's as found
-    assert more == {"to_beat": costs[0]}
+    assert (more["to_beat"], more["near"]) == (costs[0], True)
+    assert more["steps"] is choice.fit.steps
+    np.testing.assert_array_equal(more["jacobian"], choice.fit.jacobian)  # which is that of the first, too
 
 
 def test_a_polish_that_fails_leaves_what_there_was(fits: Any, monkeypatch: pytest.MonkeyPatch):

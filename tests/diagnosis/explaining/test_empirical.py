@@ -1,5 +1,6 @@
 """The terms of an empirical law as candidates, in a model's name and in the words of the result."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -7,12 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis.analytic import MOTOR, SCALES, bench, unknowns
 from diagnosis.choosing.test_decision import STRIBECK, WINDAGE, accepted_by_hand
 from thsa_cosim.diagnosis.catalogue import extend
 from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
+from thsa_cosim.diagnosis.catalogue.effect import Connectors, Values
 from thsa_cosim.diagnosis.catalogue.slots import Slot
-from thsa_cosim.diagnosis.choosing.attribution import Attribution, _is_taken
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, _is_taken, attribute
 from thsa_cosim.diagnosis.choosing.forms import _is_form
+from thsa_cosim.diagnosis.choosing.score import held_shapes
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.choosing.selection import REFINED, worth_refining
 from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL, FoundLaw, LawSearch, law_of
@@ -20,7 +24,9 @@ from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 
 PACKAGE = Path(__file__).parents[3] / "modelica" / "THSA"
 SCREW = Slot("screw", "FrictionEffect", {"v": "m/s", "z": "m", "N": "N", "F": "N"})
-CANDIDATES = {c.coefficients[0].name: c for c in candidates_of(EMPIRICAL, (SCREW,), {})}
+TERMS = candidates_of(EMPIRICAL, (SCREW,), {})
+CANDIDATES = {c.coefficients[0].name: c for c in TERMS if not c.variant.instead}
+POWER = next(c for c in TERMS if c.variant.instead)
 
 
 def proposal(name: str, gain: float) -> Proposal:
@@ -37,7 +43,59 @@ def test_a_term_neither_takes_the_place_of_another_one_nor_is_its_form():
 
 def test_several_terms_of_a_place_are_refined():
     found = worth_refining([proposal(n, 100.0 - k) for k, n in enumerate(CANDIDATES)], 1.0)
-    assert len(found) == REFINED
+    assert len({p.candidate.effect.name for p in found}) == REFINED
+
+
+def test_powers_of_the_speed_are_forms_of_one_term_the_free_exponent_last():
+    square, cube = CANDIDATES["k_vv"], CANDIDATES["k_vvv"]
+    assert _is_form(POWER, square)
+    assert _is_form(POWER, cube)
+    assert _is_taken(cube, square)
+    assert POWER.coefficients == square.coefficients, "fitted on from the square's optimum"
+    assert [p.at_start for p in POWER.shapes] == [2.0]
+
+
+class Powers:
+    """The library's powers of the speed at the motor of the analytic drive, with their laws."""
+
+    def __init__(self, true: dict[str, float], seed: int = 0) -> None:
+        def law(p: Values, at: Connectors) -> np.ndarray:
+            size, v, s = p["k_vv"], at["v"], at["s"]
+            return np.asarray(size * p["v_r"] ** 2 * np.abs(v / p["v_r"]) ** p["n"] * s + p["k_vvv"] * v**3)
+
+        (powers,) = (e for e in EMPIRICAL if e.name.endswith("k_vv"))
+        own = replace(powers, variants=tuple(replace(v, law=law) for v in powers.variants))
+        self.offered = candidates_of([own], (MOTOR,), SCALES)
+        self.bench = bench(self.offered, true, seed, held_shapes(self.offered))
+
+    def found(self) -> Attribution:
+        found = attribute(self.bench, unknowns(), self.offered, lambda _: {}, seed=1, most=3)
+        assert found is not None
+        return found
+
+
+def power_law(exponent: float) -> dict[str, float]:
+    block = "motorEffect.empirical"
+    return {f"{block}.k_vv": 2e-3, f"{block}.n": exponent, f"{block}.v_r": 30.0}
+
+
+@pytest.mark.parametrize("exponent", [1.5, 1.8, 2.6])
+def test_a_drag_with_another_power_gets_its_exponent(exponent: float):
+    found = Powers(power_law(exponent)).found()
+    (term,) = law_of(found, found.final, added=True).terms
+    n = term.shapes["n"].value
+    assert n == pytest.approx(exponent, abs=0.06)
+    assert term.term == f"30^2 |v/30|^{n:.4g} sgn(v)"
+    assert term.coefficient.value == pytest.approx(2e-3, rel=0.05)
+    assert (term.shapes["v_r"].value, term.shapes["v_r"].stderr) == (30.0, 0.0), "given, and said"
+
+
+@pytest.mark.parametrize(
+    ("true", "text"), [(power_law(2.0), "v |v|"), ({"motorEffect.empirical.k_vvv": 1e-4}, "v^3")]
+)
+def test_a_whole_power_stays_one(true: dict[str, float], text: str):
+    found = Powers(true).found()
+    assert [t.term for t in law_of(found, found.final, added=True).terms] == [text]
 
 
 def test_a_model_with_several_terms_is_named_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
@@ -111,7 +169,7 @@ def beside_a_law(true: dict[str, float], *, added: bool = True) -> tuple[FoundLa
     )
     found = Attribution(
         term.fit, 0.0, (), (term,), final,
-        weights.plain(weights.base_held, "validate"), weights.plain(held, "validate"),
+        weights.plain(weights.base_held, "validate"), weights.plain(held, "validate"), own.factors("fit"),
     )  # fmt: skip
     asked: Any = SimpleNamespace(empirical=added)
     none: Any = None

@@ -78,6 +78,7 @@ class Attribution:
 
     ``base_cost``: of the declared model's fit without weights, the prior's share included.
     ``base_validate``, ``final_validate`` (N,): held-out residuals of both, in standard deviations of the noise.
+    ``factors`` (N,): how the fit recordings' residuals of ``final`` are weighed.
     """
 
     base: Fit
@@ -87,7 +88,15 @@ class Attribution:
     final: Fit
     base_validate: FloatArray
     final_validate: FloatArray
+    factors: FloatArray
     notes: tuple[str, ...] = field(default=())
+
+    @property
+    def plain_final(self) -> Fit:
+        """``final`` without weights."""
+        final = self.final
+        rows = final.jacobian / self.factors[:, None]
+        return replace(final, residual=final.residual / self.factors, own=rows, shared=None)
 
 
 def attribute(
@@ -96,18 +105,27 @@ def attribute(
     candidates: Sequence[Candidate],
     scan: Scan,
     *,
-    start: FloatArray | None = None,
+    start: Fit | None = None,
     seed: int,
     most: int = 3,
     machine: Machine = NO_MACHINE,
+    deep: bool = True,
     say: Say = lambda _: None,
 ) -> Attribution | None:
-    """Find the effects, the declared parameters from ``start`` (default: the drawing); None if that does not run.
+    """Find the effects; None if the model does not run.
 
-    ``machine``: whose orders the ripples keep to.
+    ``start``: what the same unknowns were fitted to before, on the same recordings (default: from the drawing).
+    ``machine``: whose orders the ripples keep to. ``deep``: further starts, larger sizes, other forms and rivals count.
     """
     say("fitting the declared model")
-    base = refine(bench, unknowns, unknowns.start if start is None else start, iterations=10)
+    base = refine(
+        bench,
+        unknowns,
+        unknowns.start if start is None else start.at(unknowns.names),
+        jacobian=None if start is None else start.jacobian_of(unknowns),
+        steps=None if start is None else start.steps_of(unknowns),
+        iterations=10,
+    )
     if base is None:
         return None
     weights = ChannelWeights(bench)
@@ -138,6 +156,7 @@ def attribute(
                     accepted,
                     offered is candidates,
                     machine,
+                    deep,
                 ).folded
             )
             if len(rounds) > 1:  # which effects are alike is told by the responses of the first
@@ -168,6 +187,7 @@ def attribute(
         current,
         weights.plain(weights.base_held, "validate"),
         weights.plain(current_held, "validate"),
+        bench.factors("fit"),
         (*notes, *ended),
     )
 
@@ -219,6 +239,7 @@ def _round(
     accepted: Sequence[Scored],
     whole: bool,
     machine: Machine = NO_MACHINE,
+    deep: bool = True,
 ) -> Round:
     """Screen what is ``offered`` (``whole``: all effects, else parts of the last one), refine the best, choose one."""
     proposals = on_orders(
@@ -227,7 +248,7 @@ def _round(
     gains = largest_gains(selection.current, proposals, seed)
     limit = threshold(gains)
     scored = selection.refined(proposals, limit)
-    if whole and proposals and selection.is_open(scored):
+    if deep and whole and proposals and selection.is_open(scored):
         further = selection.further(proposals)
         scored = selection.refined_further(scored, proposals, further, limit)
         if not accepted:  # the first effect leaves the next ones a model that is led less far astray
@@ -238,7 +259,7 @@ def _round(
     choice, objections = selection.choose(scored, limit, not accepted, not whole)
     rivals: tuple[Scored, ...] = ()
     forms: tuple[Scored, ...] = ()
-    if choice is not None and whole:
+    if choice is not None and deep and whole:
         first = choice
         scored += rivals_forms(selection, choice, scored, proposals, offered)
         choice = selection.overtaking(choice, scored) or choice

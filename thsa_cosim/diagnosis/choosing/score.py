@@ -138,7 +138,9 @@ def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scor
     fits = [refine(bench, unknowns, choice.fit.vector, steps=choice.fit.steps)]
     if fits[0] is None or _is_bent(bench, fits[0]) or fits[0].misfit > ENOUGH * fits[0].residual.size:
         known = np.inf if fits[0] is None else fits[0].cost
-        fits.append(refine(bench, unknowns, unknowns.at_drawing(choice.fit.vector), to_beat=known))
+        near, steps = (choice.fit if fits[0] is None else fits[0]).jacobian, choice.fit.steps
+        drawn = unknowns.at_drawing(choice.fit.vector)
+        fits.append(refine(bench, unknowns, drawn, jacobian=near, steps=steps, near=True, to_beat=known))
     best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)
     if best is None:
         return choice

@@ -27,20 +27,20 @@ from thsa_cosim.diagnosis.catalogue.superset import scales_of, slot_signals
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute, prune
 from thsa_cosim.diagnosis.choosing.findings import values_of
 from thsa_cosim.diagnosis.choosing.orders import Machine
-from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
+from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes, held_shapes
 from thsa_cosim.diagnosis.choosing.selection import Say
 from thsa_cosim.diagnosis.choosing.verdict import VISIBLE
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified
-from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
+from thsa_cosim.diagnosis.fitting.trials import Trial, for_search
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.diagnosis.results import EmpiricalLaw, EmpiricalTerm, Value
 from thsa_cosim.scenario import DiagnoseSpec, OpenRunner, Scenario
 
-#: At most so many terms: a law of more says no more than a plot.
+#: At most so many terms: a law of more says no more than a plot. One that is only described has the most telling one.
 _TERMS = 3
 
 
@@ -74,6 +74,10 @@ _ELECTRICAL = replace(PERIODS, lower=1.0)
 _FADING = EffectParameter(
     "T_f", "s", 10.0, "time over which E fades", role="shape", lower=0.5, upper=1e5, starts=(5.0, 100.0)
 )
+_EXPONENT = EffectParameter(
+    "n", "1", 2.0, "exponent of the speed", role="shape", lower=1.1, upper=4.0, starts=(2.0, 1.5, 3.0)
+)
+_AT = EffectParameter("v_r", "V", 1.0, "speed at which k_vv holds", role="shape", fixed=True)
 #: Interface and class → the parameters of every term. A force in proportion to the load with the sign of neither is
 #: none: it gives back all that it takes, so it is no friction but a gain, which is searched at the sensors.
 _LIBRARY: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
@@ -81,7 +85,6 @@ _LIBRARY: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
         (_k("k_1", "F", "1"),),
         (_k("k_a", "F/V", "|v|"),),
         (_k("k_vv", "F/V^2", "v |v|"),),
-        (_k("k_vvv", "F/V^3", "v^3"),),
         (_k("k_z", "F/Z", "z"),),
         (_k("k_zz", "F/Z^2", "z^2"),),
         (_k("k_zs", "F/Z", "z sgn(v)"),),
@@ -148,6 +151,14 @@ _LIBRARY: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
         ),
     ),
 }
+#: Other formulas of a term: alternatives to it in its place; those with an exponent of their own are tried where one
+#: of the others was accepted.
+_FORMS: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
+    ("Empirical", "k_vv"): (
+        (_k("k_vvv", "F/V^3", "v^3"),),
+        (_k("k_vv", "F/V^2", "{v_r}^2 |v/{v_r}|^{n} sgn(v)"), _EXPONENT, _AT),
+    ),
+}
 #: Blocks that have states, or more shapes than a search can try everywhere, and the slots that they are offered in.
 _ONLY: Mapping[str, tuple[str, ...]] = {
     "EmpiricalRise": ("screw", "guide"),
@@ -158,14 +169,18 @@ _BESIDE = {("EmpiricalVoltage", "k_sin")}
 
 
 def _effect(interface: str, block: str, parameters: tuple[EffectParameter, ...]) -> Effect:
-    beside = (block, parameters[0].name) in _BESIDE
+    own = (block, parameters[0].name)
+    forms = [
+        Variant(interface, block, form, _ONLY.get(block), instead=_EXPONENT in form)
+        for form in _FORMS.get(own, ())
+    ]
     return Effect(
         name=f"{EMPIRICAL_NAME}/{block}.{parameters[0].name}",
         title="Term of an empirical law",
         physics=f"{parameters[0].description} in a sum of such terms",
         source="Brunton, Proctor, Kutz, PNAS 113 (2016) 3932",
         signature="whatever structure the effects with a name leave",
-        variants=(Variant(interface, block, parameters, _ONLY.get(block), beside=beside),),
+        variants=(Variant(interface, block, parameters, _ONLY.get(block), beside=own in _BESIDE), *forms),
     )
 
 
@@ -216,13 +231,13 @@ class LawSearch:
         beside = source_beside(self.spec.model, self.spec.package)
         source = extended_class(name, base, [*own, *terms], shapes, beside=beside)
         fmu = export_kept(self.folder, name, source, self.spec.package)
-        trials = with_fmu(self.trials, fmu)
+        trials = for_search(self.trials, fmu)
         cases = [t.case for t in trials if t.part == "fit"]
         opening = partial(self.open_runner, simulation)
         scales = scales_of(fmu, slots, cases, opening)
         candidates = candidates_of(EMPIRICAL, slots, scales)
         with self.open_runner(simulation, [t.experiment for t in trials]) as runner:
-            bench = Bench(runner, trials)
+            bench = Bench(runner, trials, held_shapes(candidates))
             unknowns = self._unknowns()
             scan = wave_number_finder(
                 bench, slots, lambda values: slot_signals(slots, cases, values, opening), self.machine
@@ -232,10 +247,11 @@ class LawSearch:
                 unknowns,
                 candidates,
                 scan,
-                start=self.after.fit.at(unknowns.names),
+                start=self.after.fit,
                 seed=self.scenario.seed,
-                most=_TERMS,
+                most=_TERMS if self.spec.empirical else 1,
                 machine=self.machine,
+                deep=self.spec.empirical,
                 say=self.say,
             )
             if found is None or not found.accepted:
@@ -291,7 +307,8 @@ def _terms(scored: Scored, values: Mapping[str, Value]) -> Iterator[EmpiricalTer
             variable=p.variable,
             role=p.role,
         )
-        for p in candidate.shapes
+        for p in candidate.parameters
+        if p.role == "shape"
     }
     for p in candidate.coefficients:
         text = texts[p.name].format(**{name: f"{shape.value:.4g}" for name, shape in shapes.items()})

@@ -24,6 +24,8 @@ SMALLEST, LARGEST = 1e-7, 0.3
 UNDERRATED, FURTHER = 1.25, (2.0, 4.0, 8.0)
 #: No step that is damped more is tried where one gains this share of what it promised.
 FORESEEN = 0.5
+#: A Jacobian serves for a further step where one gained this share of what it promised. Set beforehand.
+SERVED = 0.8
 #: A fit is given up so many steps from what is reached elsewhere, each as large as the last. Set while looking at two
 #: simulated units, with cogging that sticks and with a Stribeck friction of another form.
 HOPELESS = 4.0
@@ -60,6 +62,17 @@ class Fit:
     def at(self, names: Sequence[str]) -> FloatArray:
         """(m,) fitted values of the named unknowns."""
         return np.asarray(self.vector[self.unknowns.index(names)])
+
+    def jacobian_of(self, unknowns: Unknowns, factors: FloatArray | float = 1.0) -> FloatArray:
+        """(N, m) the Jacobian per scale of other ``unknowns``, all of which it has, its rows times ``factors`` (N,)."""
+        which = self.unknowns.index(unknowns.names)
+        columns = self.jacobian[:, which] * (unknowns.scale / self.unknowns.scale[which])
+        return np.asarray(columns * np.reshape(factors, (-1, 1)))
+
+    def steps_of(self, unknowns: Unknowns) -> FloatArray:
+        """(m,) the difference steps, in scales of other ``unknowns``, all of which it has."""
+        which = self.unknowns.index(unknowns.names)
+        return np.asarray(self.steps[which] * self.unknowns.scale[which] / unknowns.scale)
 
     @property
     def misfit(self) -> float:
@@ -154,16 +167,18 @@ def refine(
     jacobian: FloatArray | None = None,
     steps: FloatArray | None = None,
     fresh: list[int] | None = None,
+    near: bool = False,
     iterations: int = 8,
     enough: float = 1.0,
     to_beat: float = np.inf,
 ) -> Fit | None:
     """Minimise the fit recordings' squared residuals from ``vector`` (n,).
 
-    ``jacobian`` (N, n) is used as given at the start; in later iterations the columns ``fresh`` (default all) are
-    taken anew. Stops when a step promises or brings less than ``enough`` mean squares of what is left (at least of the
-    noise), or so little that the cost ``to_beat``, reached elsewhere, is HOPELESS steps away. None if the start cannot
-    be simulated.
+    ``jacobian`` (N, n) is used as given at the start; in later iterations the columns ``fresh`` are taken anew. Without
+    ``fresh`` all of them are, but not before a step gains less than SERVED of what it promised, or the fit would end:
+    it ends by no Jacobian of another vector, which a given one is if it is ``near``. Stops when a step promises or
+    brings less than ``enough`` mean squares of what is left (at least of the noise), or so little that the cost
+    ``to_beat``, reached elsewhere, is HOPELESS steps away. None if the start cannot be simulated.
     """
     n = len(unknowns.members)
     vector = unknowns.clip(vector)
@@ -176,14 +191,20 @@ def refine(
     jacobian = np.zeros((residual.size, n)) if jacobian is None else jacobian.copy()
     cost, damping, converged, stale = cost_of(unknowns, vector, residual), 1e-6, False, not jacobian.any()
     response: float | None = None
-    for _ in range(iterations):
+    left = iterations
+    while left:
+        left -= not near  # what keeps its Jacobian is a small part of an iteration
         if stale:
             new, steps = columns(bench, unknowns, vector, residual, renew, steps, response)
             jacobian[:, renew] = new
+            near = False
         state = Fit(unknowns, vector, residual, jacobian, steps, cost, converged)
         better, promised, damping = _step(bench, state, damping)
         least = enough * state.inflation
         if better is None:
+            if near:
+                near, stale = False, True
+                continue
             if promised < least:
                 converged = True
                 break
@@ -193,12 +214,14 @@ def refine(
             continue
         gained = cost - better.cost
         vector, residual, cost = better.vector, better.residual, better.cost
-        response, stale = None, True
+        response = None
         if cost - HOPELESS * max(gained, promised) > to_beat:
             break
-        if gained < least:
+        if gained < least and not near:
             converged = True
             break
+        stale = fresh is not None or gained < max(least, SERVED * promised)
+        near = not stale
     return Fit(unknowns, vector, residual, jacobian, steps, cost, converged)
 
 

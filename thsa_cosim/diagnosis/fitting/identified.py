@@ -67,15 +67,19 @@ def identify_model(
     starts: Sequence[FloatArray],
     simulation: SimulationTable,
     open_runner: OpenRunner,
+    near: Fit | None = None,
 ) -> Identified:
     """Identify ``unknowns`` of an FMU on the fit recordings from every one of ``starts``; the best fit counts.
 
+    ``near``: a fit of the same unknowns in an equal model, without weights, whose Jacobian leads the way.
     StudyError if the FMU cannot be simulated at any start.
     """
     own = with_fmu(trials, fmu)
     with open_runner(simulation, [t.experiment for t in own]) as runner:
         bench = Bench(runner, own)
         begun = [_runs(bench, unknowns, start) for start in starts]
+        jacobian = None if near is None else near.jacobian_of(unknowns)
+        steps = None if near is None else near.steps_of(unknowns)
         fits: list[Fit] = []
         ends: list[tuple[FloatArray, float]] = []
         costs = [np.inf if r is None else cost_of(unknowns, v, r) for v, r in begun]
@@ -88,7 +92,17 @@ def identify_model(
                 ends.append((vector, cost))
                 continue  # the fit so far is better than this start
             rest = min([known, *costs[number + 1 :]])
-            fit = refine(bench, unknowns, vector, residual=residual, iterations=12, to_beat=rest)
+            fit = refine(
+                bench,
+                unknowns,
+                vector,
+                residual=residual,
+                jacobian=jacobian,
+                steps=steps,
+                near=jacobian is not None,
+                iterations=12,
+                to_beat=rest,
+            )
             fits += [] if fit is None else [fit]
         best = min(fits, key=lambda f: f.cost, default=None)
         ends += [(f.vector, f.cost) for f in fits if f is not best]

@@ -31,10 +31,13 @@ class ChannelWeights:
             after[name] = 1.0 / max(1.0, float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
         if any(not 1.0 / SAME < after[name] / before.get(name, 1.0) < SAME for name in after):
             plain = self.plain(self.base_held, "validate") if self.base_held.size else self.base_held
+            factors = bench.factors("fit")
             bench.weights = after
             if plain.size:
                 self.base_held = plain * bench.factors("validate")
-            fit = refine(bench, fit.unknowns, fit.vector, steps=fit.steps) or fit
+            jacobian = fit.jacobian_of(fit.unknowns, bench.factors("fit") / factors)
+            again = refine(bench, fit.unknowns, fit.vector, jacobian=jacobian, steps=fit.steps, near=True)
+            fit = fit if again is None else again
         return fit, bench.residuals(fit.unknowns, fit.vector[None, :], "validate")[0]
 
     def plain(self, residual: FloatArray, part: Part) -> FloatArray:

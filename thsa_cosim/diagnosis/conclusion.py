@@ -55,6 +55,9 @@ from thsa_cosim.study import Comparison, CouplingError, Study, coupling_error, r
 WORK = "superset"
 #: A search's fit of the declared model is a better optimum if its cost is less by this: three standard errors, squared.
 BETTER = 9.0
+#: A law is described where effects leave this share of the declared model's structure. Set while looking at two units
+#: whose effects leave less: the search took a quarter of their time.
+WORTH = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +96,10 @@ class Conclusion:
         found_errors = errors(held_out, extended.identified.validate)
         verdict = verdict_on(found_errors, len(found.accepted), _tested(found))
         law: EmpiricalLaw | None = None
-        if verdict == "unexplained-structure" and self.box is None:
+        unexplained = verdict == "unexplained-structure" and self.box is None
+        if unexplained and (why := note_on_no_law(share, empirical=self.spec.empirical)):
+            found = replace(found, notes=(*found.notes, why))
+        elif unexplained:
             searched = self._law_search(extended.identified)
             if searched is not None and self.spec.empirical:
                 # The share stays that of the effects: a law describes and explains nothing.
@@ -260,6 +266,16 @@ class Conclusion:
         if extended.model is not None and extended.fmu is not None:
             again = export_command(extended.model, self.spec.package, extended.fmu)
             yield f"{extended.fmu.name} is for {native_platform().fmi3} only; {again} compiles it for all platforms"
+
+
+def note_on_no_law(share: float, *, empirical: bool) -> str:
+    """Why no law is searched in the ``share`` of the declared model's structure that effects leave; "" if one is."""
+    if empirical or share >= WORTH:
+        return ""
+    return (
+        f"no empirical law was searched in the {share:.0%} of the repeatable residual that the effects leave;"
+        " empirical = true in [diagnose] searches one"
+    )
 
 
 def export_command(model: object, package: object, fmu: object) -> str:

@@ -5,7 +5,7 @@ from functools import partial
 
 from threadpoolctl import threadpool_limits
 
-from thsa_cosim.batch.memory import give_back
+from thsa_cosim.batch.memory import give_back, kept
 from thsa_cosim.diagnosis.blackbox.prepare import BlackBox, wrap_black_box
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect, declared_effects
 from thsa_cosim.diagnosis.catalogue.effect import Effect
@@ -54,7 +54,7 @@ def diagnose(scenario: Scenario, place: Place) -> DiagnosisResult:
     effects = choose(known_effects(spec.catalogue), spec.effects, f"{scenario.path}: diagnose.effects")
     # One thread: the matrices are tall and narrow, and the simulations have the other cores.
     one_thread = threadpool_limits(limits=1, user_api="blas")
-    with one_thread, Study.open(place, study_identity(scenario), describe(scenario)) as study:
+    with one_thread, kept(), Study.open(place, study_identity(scenario), describe(scenario)) as study:
         result = _diagnose(scenario, spec, study, trials, unknowns, effects.values())
         study.complete()
     return result

@@ -85,7 +85,7 @@ def difference_columns(
     centre. A column of which nothing can be simulated is zero.
     """
     columns = list(range(x.size)) if which is None else list(which)
-    found, steps = np.zeros((centre.size, len(columns))), steps.copy()
+    found, steps = np.zeros((centre.size, len(columns)), order="F"), steps.copy()
     aim = max(settings.response, settings.share * float(np.linalg.norm(centre)))
     open_ = list(range(len(columns)))
     for _ in range(settings.repeats + 1):

@@ -114,7 +114,10 @@ def test_a_free_order_counts_with_its_fit_where_it_explains_what_the_integer_lea
     choice = Scored(proposal, fit, residuals[0], 1.0, 1.0, 9.0, 1.0)
     asked: list[Any] = []
 
-    def refined(bench: Any, unknowns: Unknowns, vector: np.ndarray, steps: np.ndarray) -> Fit | None:
+    def refined(
+        bench: Any, unknowns: Unknowns, vector: np.ndarray, jacobian: np.ndarray, steps: np.ndarray
+    ) -> Fit | None:
+        assert jacobian is fit.jacobian
         asked.append((unknowns, vector, steps))
         return None if fails == "refine" else replace(fit, unknowns=unknowns, vector=vector + 0.01)
 

@@ -67,6 +67,8 @@ def principal_angles(responses: Sequence[FloatArray]) -> FloatArray:
 def _orthonormal(response: FloatArray) -> FloatArray:
     """(N, r) an orthonormal basis of the columns (N, k); what is nearly a combination of the others is left out."""
     size = np.linalg.norm(response, axis=0)
+    if size.size == 1 and size[0] > 0.0:
+        return np.asarray(response / size, dtype=np.float64)
     left, values, _ = np.linalg.svd(response[:, size > 0.0] / size[size > 0.0], full_matrices=False)
     return np.asarray(left[:, values > 1e-3], dtype=np.float64)
 

@@ -52,7 +52,7 @@ def freed(
     proposal = replace(choice.proposal, held=frozenset())
     own = {u.name: u.spread for u in unknowns_of(proposal.candidate, proposal.shapes)}
     members = [replace(u, spread=own.get(u.name, u.spread)) for u in fit.unknowns.members]
-    free = refine(bench, Unknowns(tuple(members)), fit.vector, steps=fit.steps)
+    free = refine(bench, Unknowns(tuple(members)), fit.vector, jacobian=fit.jacobian, steps=fit.steps)
     validate = None if free is None else bench.residuals(free.unknowns, free.vector[None, :], "validate")[0]
     if free is None or validate is None or out_of_range(free):
         return choice, *found

@@ -188,7 +188,7 @@ def refine(
             return None
     steps = np.full(n, 1e-2) if steps is None else steps
     renew = list(range(n)) if fresh is None else fresh
-    jacobian = np.zeros((residual.size, n)) if jacobian is None else jacobian.copy()
+    jacobian = np.zeros((residual.size, n), order="F") if jacobian is None else jacobian.copy(order="F")
     cost, damping, converged, stale = cost_of(unknowns, vector, residual), 1e-6, False, not jacobian.any()
     response: float | None = None
     left = iterations

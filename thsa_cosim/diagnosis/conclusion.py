@@ -299,9 +299,13 @@ def known_candidates(known: Sequence[DeclaredEffect]) -> tuple[list[Candidate], 
 
 
 def _sure(identified: Identified) -> np.ndarray:
-    """(n,) standard errors of an identified model's unknowns, with how well the fit and its starts agree on them."""
+    """(n,) standard errors of an identified model's unknowns, with how well the fit and its starts agree on them.
+
+    What the noise of smoothed inputs adds is among them.
+    """
     own = standard_errors(identified.fit, [t for t in identified.trials if t.part == "fit"])
-    return np.asarray(np.sqrt(own**2 + identified.apart**2 + identified.fit.remaining_step**2))
+    further = (identified.apart, identified.fit.remaining_step, identified.of_inputs)
+    return np.asarray(np.sqrt(own**2 + sum(np.square(one) for one in further)))
 
 
 def _errors(identified: Identified) -> dict[str, Mapping[str, StructuredError]]:

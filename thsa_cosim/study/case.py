@@ -22,7 +22,8 @@ class Case:
     """One recording as a simulation: ``inputs`` drive the FMU over ``time`` (n,) in s.
 
     ``channels`` are fitted, within the cost's window; ``measured`` holds all samples after the lead-in.
-    ``fixed``: start values that every run has, in the FMU's units.
+    ``fixed``: start values that every run has, in the FMU's units. ``input_noise``: 1 σ of the white noise that was
+    smoothed away, of inputs that are piecewise linear.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Case:
     tolerance: float | None
     wrapper: Wrapper | None = None
     texts: Mapping[str, str] = field(default_factory=dict)
+    input_noise: Mapping[str, float] = field(default_factory=dict)
 
     def experiment(self, name: str, reduce: Reducer | None) -> Experiment:
         """The simulation under ``name`` with what the worker makes of its signals."""
@@ -92,7 +94,20 @@ def build_case(scenario: Scenario, recording: Recording, fixed: Mapping[str, flo
         temperature_degC=recording.temperature_degC,
         tolerance=scenario.simulation.tolerance,
         texts=scenario.texts,
+        input_noise=_smoothed(scenario, recording),
     )
+
+
+def _smoothed(scenario: Scenario, recording: Recording) -> dict[str, float]:
+    """Noise of the inputs that are piecewise linear, and not as measured for a doubt."""
+    found = {}
+    for name in scenario.inputs:
+        column = scenario.table.recordings.columns.get(name)
+        asked = column is not None and column.smooth == "piecewise-linear" and name in recording.samples
+        if asked and not np.array_equal(recording.samples[name].values, recording.signals[name]):
+            noise = (column.noise if column is not None else None) or recording.noise.get(name, 0.0)
+            found[name] = float(noise)
+    return {name: noise for name, noise in found.items() if noise > 0.0}
 
 
 def _channel(

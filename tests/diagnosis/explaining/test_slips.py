@@ -65,7 +65,9 @@ def identified(recordings: Mapping[str, tuple[str, Damage]]) -> Identified:
     members = tuple(Unknown(n, n, "1", 0.5, np.inf, 1.0, 0.0, 9.0) for n in ("T", "R"))
     fit = Fit(Unknowns(members), best, residual(best), jacobian(best), np.ones(2), 10.0, True)
     signals: dict[str, Signals | None] = {t.name: Signals(TIME, true(best), UNITS) for t in trials}
-    return Identified(Path("m.fmu"), fit, np.zeros(0), tuple(trials), signals, 1, {}, np.zeros(2))
+    return Identified(
+        Path("m.fmu"), fit, np.zeros(0), tuple(trials), signals, 1, {}, np.zeros(2), np.zeros(2)
+    )
 
 
 def offset(by: float) -> Damage:

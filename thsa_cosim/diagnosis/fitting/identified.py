@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
+from thsa_cosim.diagnosis.fitting.inputs import draws_of, errors_of_inputs
 from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.errors import StudyError
@@ -22,7 +24,8 @@ TRIES, NEAR = 4, 1e-3
 class Identified:
     """A model identified on the fit recordings: its FMU, the fit, the held-out residuals (N,), and all its signals.
 
-    ``apart`` (n,): how far the ends of several starts lie from the best one (`between_starts`).
+    ``apart`` (n,): how far the ends of several starts lie from the best one (`between_starts`). ``of_inputs`` (n,):
+    what the noise of smoothed inputs adds to the standard errors.
     """
 
     fmu: Path
@@ -33,6 +36,7 @@ class Identified:
     evaluations: int
     failures: dict[str, int]
     apart: FloatArray
+    of_inputs: FloatArray
 
 
 def between_starts(best: Fit, ends: Sequence[tuple[FloatArray, float]]) -> FloatArray:
@@ -75,7 +79,8 @@ def identify_model(
     StudyError if the FMU cannot be simulated at any start.
     """
     own = with_fmu(trials, fmu)
-    with open_runner(simulation, [t.experiment for t in own]) as runner:
+    draws = draws_of(own)
+    with open_runner(simulation, [t.experiment for t in (*own, *chain(*draws))]) as runner:
         bench = Bench(runner, own)
         begun = [_runs(bench, unknowns, start) for start in starts]
         jacobian = None if near is None else near.jacobian_of(unknowns)
@@ -110,6 +115,9 @@ def identify_model(
         if best is None or validate is None:
             reason = next(iter(bench.failures), "no run succeeded")
             raise StudyError(f"{fmu.name} cannot be identified: {reason}")
+        redrawn = [
+            Bench(runner, trials).residuals(unknowns, best.vector[None, :], "fit")[0] for trials in draws
+        ]
         return Identified(
             fmu,
             best,
@@ -119,4 +127,5 @@ def identify_model(
             bench.evaluations,
             bench.failures,
             between_starts(best, ends),
+            errors_of_inputs(best, [residual for residual in redrawn if residual is not None]),
         )

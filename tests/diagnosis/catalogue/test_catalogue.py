@@ -81,6 +81,8 @@ def test_every_slot_has_candidates_with_names_and_variables_of_their_own(slots: 
     assert {c.effect.name for c in made} >= set(PROMISED)
     named = {c.name for c in made}
     assert {"stribeck:screw", "stribeck:motor", "backlash", "current-sensor-offset"} <= named
+    for effect in ("stribeck", "asymmetric-friction", "load-dependent-friction", "friction-run-in"):
+        assert {f"{effect}:{place}" for place in ("motor", "gearbox", "screw")} <= named, "each of them rubs"
     for c in made:
         assert all(p.variable.startswith(f"{c.slot.component}.{c.component}.") for p in c.parameters)
 

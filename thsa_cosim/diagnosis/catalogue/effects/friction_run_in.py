@@ -40,7 +40,7 @@ EFFECT = Effect(
                     starts=(0.1, 0.5),
                 ),
             ),
-            slots=("screw", "motor", "guide"),
+            slots=("screw", "motor", "gearbox", "guide"),
             law=friction,
         ),
         Variant(
@@ -59,7 +59,7 @@ EFFECT = Effect(
                     starts=(4.0,),
                 ),
             ),
-            slots=("screw", "motor", "guide"),
+            slots=("screw", "motor", "gearbox", "guide"),
             law=friction_over_time,
         ),
     ),

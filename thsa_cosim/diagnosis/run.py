@@ -19,6 +19,7 @@ from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.conclusion import WORK, Conclusion, known_candidates
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
+from thsa_cosim.diagnosis.fitting.following import Following
 from thsa_cosim.diagnosis.fitting.identified import identify_model
 from thsa_cosim.diagnosis.fitting.trials import (
     Trial,
@@ -110,17 +111,20 @@ def _diagnose(
         }
         machine = machine_of(tested.slots, signals_at(at_start))
         scan = wave_number_finder(bench, tested.slots, signals_at, machine)
-        found = attribute(
-            bench,
-            unknowns,
-            tested.candidates,
-            scan,
-            start=before.fit,
-            seed=scenario.seed,
-            most=spec.most,
-            machine=machine,
-            say=say,
-        )
+        slots = () if isinstance(tested, BlackBox) else tested.slots
+        with Following(bench, slots, signals_at, opening) as following:
+            found = attribute(
+                bench,
+                unknowns,
+                tested.candidates,
+                scan,
+                start=before.fit,
+                seed=scenario.seed,
+                most=spec.most,
+                machine=machine,
+                following=following,
+                say=say,
+            )
     give_back()  # what the search took
     if found is None:
         reason = next(iter(bench.failures), "no run succeeded")

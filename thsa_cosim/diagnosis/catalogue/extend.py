@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
-from thsa_cosim.diagnosis.catalogue.slots import INPUTS, OPTIONAL, OUTPUTS, Slot
+from thsa_cosim.diagnosis.catalogue.slots import INJECTED, INPUTS, OPTIONAL, OUTPUTS, Slot
 from thsa_cosim.errors import ModelicaError
 from thsa_cosim.export import export_fmu
 from thsa_cosim.export.compile import native_platform
@@ -31,21 +31,30 @@ def extended_class(
     values: Mapping[str, float] | None = None,
     description: str = "",
     beside: str = "",
+    injection: bool = False,
 ) -> str:
     """Modelica source of a class ``name`` that extends ``base`` (qualified) with the candidates' effects.
 
     ``values``: start values by FMU variable, in SI units as the classes have them; else neutral. ``beside``: source of
-    classes that are in no package (`source_beside`).
+    classes that are in no package (`source_beside`). ``injection``: every friction slot can follow a measured speed.
     """
     slots = {candidate.slot.name: candidate.slot for candidate in candidates}
+    injected = {name for name, slot in slots.items() if injection and slot.interface == INJECTED}
     blocks = [
-        _block(slot, [c for c in candidates if c.slot.name == name], values or {})
+        _block(slot, [c for c in candidates if c.slot.name == name], values or {}, name in injected)
         for name, slot in slots.items()
     ]
-    redeclared = ",\n    ".join(f"redeclare {_block_name(slot)} {slot.component}" for slot in slots.values())
+    inputs = [
+        f'  THSA.Interfaces.RealInput {slots[name].measured} "Measured speed: {name}"\n' for name in injected
+    ]
+    redeclared = ",\n    ".join(
+        f"redeclare {_block_name(slot)} {slot.component}"
+        + (f"(v_m = {slot.measured})" if n in injected else "")
+        for n, slot in slots.items()
+    )
     return (
         f'within ;\n{beside}model {name} "{description or base}"\n'
-        + "".join(blocks)
+        + "".join([*blocks, *(line.replace("\n", ";\n") for line in sorted(inputs))])
         + f"  extends {base}(\n    {redeclared});\nend {name};\n"
     )
 
@@ -54,8 +63,13 @@ def _block_name(slot: Slot) -> str:
     return slot.name[0].upper() + slot.name[1:] + "Effects"
 
 
-def _block(slot: Slot, candidates: Sequence[Candidate], values: Mapping[str, float]) -> str:
-    """The block of a slot; candidates of one component, such as the terms of a law, set its parameters together."""
+def _block(
+    slot: Slot, candidates: Sequence[Candidate], values: Mapping[str, float], injected: bool = False
+) -> str:
+    """The block of a slot; candidates of one component, such as the terms of a law, set its parameters together.
+
+    ``injected``: with a force against the speed's deviation from a measured one.
+    """
     members = {c.component: c for c in candidates}
     titles = dict.fromkeys(c.effect.title for c in members.values())
     lines = [f'  block {_block_name(slot)} "{", ".join(titles)}"']
@@ -67,11 +81,17 @@ def _block(slot: Slot, candidates: Sequence[Candidate], values: Mapping[str, flo
         ]
         modifiers += [f"{v} = {v}" for v in OPTIONAL.get(slot.interface, ())]
         lines.append(f"    {member.qualified_block} {component}({', '.join(modifiers)});")
+    terms = {v: [f"{component}.{v}" for component in members] for v in OUTPUTS[slot.interface]}
+    if injected:
+        lines.append('    THSA.Interfaces.RealInput v_m "Measured speed";')
+        lines.append(
+            '    parameter Real g_m = 0 "Output injection: force per speed beyond the measured one";'
+        )
+        terms["F"].append("(if g_m > 0 then g_m*(v - v_m) else 0)")
     lines.append("  equation")
     for component in members:
         lines += [f"    {component}.{v} = {v};" for v in INPUTS[slot.interface]]
-    for output in OUTPUTS[slot.interface]:
-        lines.append(f"    {output} = {' + '.join(f'{component}.{output}' for component in members)};")
+    lines += [f"    {output} = {' + '.join(parts)};" for output, parts in terms.items()]
     return "\n".join([*lines, f"  end {_block_name(slot)};\n"])
 
 

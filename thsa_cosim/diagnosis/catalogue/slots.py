@@ -47,6 +47,8 @@ SCALES: Mapping[str, Mapping[str, str]] = {
 }
 #: The position over which effects may repeat, of the interfaces that have one whose residual is searched for it.
 POSITION: Mapping[str, str] = {"FrictionEffect": "z", "PhaseEffect": "phi"}
+#: The interface whose slots can be made to follow a measured speed: force against speed.
+INJECTED = "FrictionEffect"
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,16 @@ class Slot:
         """Whether this is the ``place`` of an effect, or one of several: ``motor``, ``motorA``, ``motor2``."""
         rest = self.name.removeprefix(place)
         return self.name.startswith(place) and (not rest or rest[0].isupper() or rest[0].isdigit())
+
+    @property
+    def measured(self) -> str:
+        """FMU input of the superset: the measured speed that the place is to follow."""
+        return f"{self.name}Measured"
+
+    @property
+    def gain(self) -> str:
+        """FMU parameter of the superset: the force per speed by which it follows, 0: it does not."""
+        return f"{self.component}.g_m"
 
     @property
     def position(self) -> str | None:

@@ -66,7 +66,8 @@ def build_superset(
     base = qualified(model, package)
     name = base.replace(".", "_") + "_superset"
     beside = source_beside(model, package)
-    source = extended_class(name, base, candidates, description="All effects, neutral", beside=beside)
+    description = "All effects, neutral"
+    source = extended_class(name, base, candidates, description=description, beside=beside, injection=True)
     return export_kept(folder, name, source, package), slots, effects
 
 

@@ -4,7 +4,7 @@ Forward selection (each step against the model so far, declared parameters fitte
 effect must still be needed beside the others.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 
@@ -14,13 +14,15 @@ from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
 from thsa_cosim.diagnosis.choosing.forms import best_form, rivals_forms
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, SMALLEST_STRUCTURE, out_of_range
+from thsa_cosim.diagnosis.choosing.in_step import Scan
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine
 from thsa_cosim.diagnosis.choosing.ripples import freed, on_orders
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns
-from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
-from thsa_cosim.diagnosis.choosing.selection import Say, Selection
+from thsa_cosim.diagnosis.choosing.screen import Proposal, Say, screen
+from thsa_cosim.diagnosis.choosing.selection import Selection
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
+from thsa_cosim.diagnosis.fitting.following import Following
 from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, structures
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
@@ -29,8 +31,6 @@ from thsa_cosim.signals import FloatArray
 #: Objections to what another form, or another effect, takes the place of.
 TAKEN = "another form of it fits better"
 APART = "explains the held-out recordings as well, but not the fit recording that distinguishes them"
-
-Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,12 +110,14 @@ def attribute(
     most: int = 3,
     machine: Machine = NO_MACHINE,
     deep: bool = True,
+    following: Following | None = None,
     say: Say = lambda _: None,
 ) -> Attribution | None:
     """Find the effects; None if the model does not run.
 
     ``start``: what the same unknowns were fitted to before, on the same recordings (default: from the drawing).
     ``machine``: whose orders the ripples keep to. ``deep``: further starts, larger sizes, other forms and rivals count.
+    ``following``: what keeps the model in step where it sticks and slips.
     """
     say("fitting the declared model")
     base = refine(
@@ -144,14 +146,14 @@ def attribute(
         say(f"screening {len(candidates)} candidates{beside}")
         offered: Sequence[Candidate] = candidates
         while offered:
-            selection = Selection(bench, weights, current, current_held, say)
+            selection = Selection(bench, weights, current, current_held, say, following)
             free = [c for c in offered if not any(_is_taken(c, s.candidate) for s in accepted)]
             left = [c for c in free if not _is_known(c, current)]
             rounds.append(
                 _round(
                     selection,
                     left,
-                    scan(current),
+                    scan,
                     seed + len(rounds),
                     accepted,
                     offered is candidates,
@@ -234,7 +236,7 @@ def _is_taken(candidate: Candidate, accepted: Candidate) -> bool:
 def _round(
     selection: Selection,
     offered: Sequence[Candidate],
-    waves: Mapping[str, Sequence[float]],
+    scan: Scan,
     seed: int,
     accepted: Sequence[Scored],
     whole: bool,
@@ -243,7 +245,9 @@ def _round(
 ) -> Round:
     """Screen what is ``offered`` (``whole``: all effects, else parts of the last one), refine the best, choose one."""
     proposals = on_orders(
-        screen(selection.bench, selection.current, offered, waves), machine, selection.current
+        screen(selection.bench, selection.current, offered, scan(selection.current)),
+        machine,
+        selection.current,
     )
     gains = largest_gains(selection.current, proposals, seed)
     limit = threshold(gains)
@@ -257,6 +261,11 @@ def _round(
         gains = largest_gains(selection.current, proposals, seed)
         limit = threshold(gains)
     choice, objections = selection.choose(scored, limit, not accepted, not whole)
+    if deep and selection.sticks and (choice is None or out_of_range(choice.fit)):
+        scored = selection.refined_in_step(offered, scan, machine, scored)
+        choice, objections = selection.choose(scored, limit, not accepted, not whole)
+        if choice is not None and choice.proposal not in proposals:
+            proposals = [choice.proposal, *proposals]
     rivals: tuple[Scored, ...] = ()
     forms: tuple[Scored, ...] = ()
     if choice is not None and deep and whole:

@@ -10,8 +10,7 @@ from dataclasses import replace
 from thsa_cosim.diagnosis.choosing.gates import NEXT_SHARE, SIGMAS, out_of_range
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored
-from thsa_cosim.diagnosis.choosing.screen import Proposal
-from thsa_cosim.diagnosis.choosing.selection import Say
+from thsa_cosim.diagnosis.choosing.screen import Proposal, Say
 from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE, is_visible
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine

@@ -78,11 +78,19 @@ class Bench:
         self._fixed = dict(fixed or {})
         self.weights: Mapping[str, float] = {}
         """Factors of the channels' residuals, 1 where none is given."""
+        self._beside: list[Bench] = []
 
     @property
     def evaluations(self) -> int:
-        """Simulations so far."""
-        return self._engine.runs
+        """Simulations so far, those of the benches `beside` it included."""
+        return self._engine.runs + sum(bench.evaluations for bench in self._beside)
+
+    def beside(self, runner: Runner, trials: Sequence[Trial], fixed: Mapping[str, float]) -> "Bench":
+        """The same recordings driven otherwise, as ``trials``, with further ``fixed`` start values; weighed alike."""
+        made = Bench(runner, trials, {**self._fixed, **fixed})
+        made.failures, made.weights = self.failures, self.weights
+        self._beside.append(made)
+        return made
 
     def factors(self, part: Part) -> FloatArray:
         """(N,) what the stacked residuals of ``part`` are multiplied by."""

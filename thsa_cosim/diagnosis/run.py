@@ -13,6 +13,7 @@ from thsa_cosim.diagnosis.catalogue.extend import write_extended_model
 from thsa_cosim.diagnosis.catalogue.known import choose, known_effects
 from thsa_cosim.diagnosis.catalogue.superset import Superset, open_superset
 from thsa_cosim.diagnosis.choosing.attribution import attribute
+from thsa_cosim.diagnosis.choosing.in_step import InStep
 from thsa_cosim.diagnosis.choosing.orders import machine_of
 from thsa_cosim.diagnosis.choosing.score import held_shapes
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
@@ -113,6 +114,7 @@ def _diagnose(
         scan = wave_number_finder(bench, tested.slots, signals_at, machine)
         slots = () if isinstance(tested, BlackBox) else tested.slots
         with Following(bench, slots, signals_at, opening) as following:
+            in_step = InStep(bench, following, unknowns, tested.candidates, scan, machine, scenario.seed, say)
             found = attribute(
                 bench,
                 unknowns,
@@ -122,7 +124,7 @@ def _diagnose(
                 seed=scenario.seed,
                 most=spec.most,
                 machine=machine,
-                following=following,
+                begin=in_step.begin,
                 say=say,
             )
     give_back()  # what the search took

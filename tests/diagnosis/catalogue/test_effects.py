@@ -50,6 +50,26 @@ def steady(plant: Plant, values: Mapping[str, float], seconds: float = 5.0) -> d
     return {name: float(found[name][-1]) for name in OUTPUTS}
 
 
+def test_a_place_follows_a_measured_speed_with_a_gain_and_without_one_it_does_not(superset: Plant):
+    given = 60.0 * np.sin(8.0 * TIME)
+    inputs = {
+        "v_cmd": COMMAND,
+        "F_load": np.full(TIME.size, LOAD),
+        "T_amb": np.full(TIME.size, TEMPERATURE),
+        "motorMeasured": given,
+    }
+
+    def speed(gain: float) -> np.ndarray:
+        start = {"motorEffect.g_m": gain}
+        return np.asarray(superset.run(start, Signals(TIME, inputs), ("w_m",), TIME, tolerance=1e-8)["w_m"])
+
+    np.testing.assert_allclose(speed(0.0), run(superset, {})["w_m"], atol=1e-3)
+    strongly, weakly = speed(100.0), speed(10.0)
+    after = TIME > 0.1
+    assert np.abs(strongly - given)[after].max() < 1.0
+    np.testing.assert_allclose((weakly - given)[after], 10.0 * (strongly - given)[after], atol=0.8)
+
+
 def test_neutral_it_is_the_declared_model(superset: Plant):
     with Plant.open(ROOT / "fmus" / "THSA.fmu") as plant:
         declared = run(plant, {})

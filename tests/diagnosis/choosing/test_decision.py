@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis.analytic import bench, candidates, unknowns
 from thsa_cosim.diagnosis.choosing import attribution as room
-from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute, prune
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, Begun, attribute, prune
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged
 from thsa_cosim.diagnosis.choosing.gates import out_of_range
 from thsa_cosim.diagnosis.choosing.orders import Machine
@@ -84,6 +84,41 @@ def test_a_search_that_only_describes_is_no_deep_one(monkeypatch: pytest.MonkeyP
     assert found is not None
     assert [s.candidate.effect.name for s in found.accepted] == ["windage"]
     assert found.rounds[0].rivals == found.rounds[0].forms == ()
+
+
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_what_is_found_in_another_way_first_counts_and_is_gone_on_from_if_that_is_asked(goes_on: bool):
+    offered = candidates(*NAMES)
+    first = diagnosed({**WINDAGE, **STRIBECK}, most=1)
+
+    def begin(weights: ChannelWeights, base: Fit, held: np.ndarray) -> Begun:
+        np.testing.assert_allclose(weights.base_held, held)
+        np.testing.assert_allclose(base.vector, first.base.vector)
+        return Begun(
+            first.rounds,
+            first.accepted,
+            first.final,
+            first.final_validate,
+            goes_on=goes_on,
+            notes=("a note",),
+        )
+
+    own = bench(offered, {**WINDAGE, **STRIBECK})
+    found = attribute(own, unknowns(), offered, lambda _: {}, seed=1, begin=begin)
+    assert found is not None
+    names = [s.candidate.effect.name for s in found.accepted]
+    assert names[0] == first.accepted[0].candidate.effect.name
+    assert sorted(names) == (["stribeck", "windage"] if goes_on else names)
+    assert len(found.rounds) == (2 if goes_on else 1)
+    assert "a note" in found.notes
+
+
+def test_less_than_what_is_settled_is_not_looked_into():
+    offered = candidates(*NAMES)
+    own = bench(offered, {**WINDAGE, **STRIBECK})
+    found = attribute(own, unknowns(), offered, lambda _: {}, seed=1, settled=1e6)
+    assert found is not None
+    assert len(found.accepted) == len(found.rounds) == 1
 
 
 def test_the_search_starts_where_it_is_told_to_and_repeats_itself():

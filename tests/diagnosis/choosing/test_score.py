@@ -55,7 +55,7 @@ def fits(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(room, "refine", refined)
     monkeypatch.setattr(
         room,
-        "_scored",
+        "judge",
         lambda bench, proposal, found, current, held: replace(scored(found), proposal=proposal),
     )
     return own
@@ -104,7 +104,7 @@ def test_a_polish_that_fails_leaves_what_there_was(fits: Any, monkeypatch: pytes
     assert polish(nothing, choice, choice.fit, HELD).fit.vector[0] == 1.5
     fits.queue = [None, None]
     assert polish(nothing, choice, choice.fit, HELD) is choice
-    monkeypatch.setattr(room, "_scored", lambda *given: None)
+    monkeypatch.setattr(room, "judge", lambda *given: None)
     fits.queue = [fit(2.1, 1.0, 100.0)]
     assert polish(nothing, choice, choice.fit, HELD) is choice, (
         "the held-out recordings cannot be simulated there"
@@ -136,7 +136,7 @@ def test_going_on_keeps_the_declared_columns_and_stops_where_it_converged(
     assert go_on(bench, done, declared, HELD) is done
     fits.queue = [None]
     assert go_on(bench, choice, declared, HELD) is choice
-    monkeypatch.setattr(room, "_scored", lambda *given: None)
+    monkeypatch.setattr(room, "judge", lambda *given: None)
     fits.queue = [fit(2.2, 1.0, 100.0)]
     assert go_on(bench, choice, declared, HELD) is choice
 
@@ -292,7 +292,7 @@ def scored_on(held: np.ndarray, validate: np.ndarray | None) -> Scored | None:
     """The score of a fit that leaves ``validate`` of what was ``held``."""
     bench: Any = SimpleNamespace(of=lambda part: TRIALS, residuals=lambda unknowns, vectors, part: [validate])
     nothing: Any = SimpleNamespace()
-    return room._scored(bench, nothing, fit(2.0, 1.0, 100.0), fit(1.0, 4.0, 400.0), held)
+    return room.judge(bench, nothing, fit(2.0, 1.0, 100.0), fit(1.0, 4.0, 400.0), held)
 
 
 def test_a_score_is_what_the_held_out_recordings_lose():

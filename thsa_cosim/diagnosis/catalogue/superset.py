@@ -26,8 +26,8 @@ from thsa_cosim.study import Case
 class Superset:
     """The FMU with all effects, its slots, and the candidates with the scales of this drive.
 
-    ``signals_at``: a runner of ``watched`` and start values by case → the inputs of every slot with a position, by
-    case.
+    ``signals_at``: a runner of ``watched`` and start values by case → the inputs of every slot with a position, and
+    the outputs that are compared, by case.
     """
 
     fmu: Path
@@ -131,7 +131,10 @@ def slot_signals(
 
 
 def slot_experiments(slots: Sequence[Slot], cases: Sequence[Case]) -> tuple[Experiment, ...]:
-    """What ``run_slots`` runs: the cases with the position in every slot, and of a friction slot speed and load."""
+    """What ``run_slots`` runs: the cases with the position in every slot, and of a friction slot speed and load.
+
+    What is compared comes along: an output may be the speed in a slot.
+    """
     friction = (s for s in slots if s.interface == "FrictionEffect")
     outputs = tuple(
         dict.fromkeys(
@@ -141,7 +144,12 @@ def slot_experiments(slots: Sequence[Slot], cases: Sequence[Case]) -> tuple[Expe
             ]
         )
     )
-    return tuple(replace(_with_outputs(case, outputs), name=_slots_of(case)) for case in cases)
+    return tuple(
+        replace(
+            _with_outputs(case, tuple(dict.fromkeys((*outputs, *case.measured.names)))), name=_slots_of(case)
+        )
+        for case in cases
+    )
 
 
 def run_slots(

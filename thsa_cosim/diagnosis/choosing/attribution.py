@@ -4,7 +4,7 @@ Forward selection (each step against the model so far, declared parameters fitte
 effect must still be needed beside the others.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 
@@ -14,15 +14,13 @@ from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
 from thsa_cosim.diagnosis.choosing.forms import best_form, rivals_forms
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, SMALLEST_STRUCTURE, out_of_range
-from thsa_cosim.diagnosis.choosing.in_step import Scan
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine
-from thsa_cosim.diagnosis.choosing.ripples import freed, on_orders
+from thsa_cosim.diagnosis.choosing.ripples import freed, leaves_structure, on_orders
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns
-from thsa_cosim.diagnosis.choosing.screen import Proposal, Say, screen
-from thsa_cosim.diagnosis.choosing.selection import Selection
+from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
+from thsa_cosim.diagnosis.choosing.selection import Say, Selection
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
-from thsa_cosim.diagnosis.fitting.following import Following
 from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, structures
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
@@ -31,6 +29,8 @@ from thsa_cosim.signals import FloatArray
 #: Objections to what another form, or another effect, takes the place of.
 TAKEN = "another form of it fits better"
 APART = "explains the held-out recordings as well, but not the fit recording that distinguishes them"
+
+Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +99,25 @@ class Attribution:
         return replace(final, residual=final.residual / self.factors, own=rows, shared=None)
 
 
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """What was found before the first screening: its rounds, the effects, the model's fit with them, and what to note.
+
+    ``held`` (N,): its held-out residuals. ``goes_on``: whether further effects are looked for beside it.
+    """
+
+    rounds: tuple[Round, ...]
+    accepted: tuple[Scored, ...]
+    fit: Fit
+    held: FloatArray
+    goes_on: bool = True
+    notes: tuple[str, ...] = ()
+
+
+#: The weights, the declared model's fit, and its held-out residuals (N,) → what is found at once.
+Begin = Callable[[ChannelWeights, Fit, FloatArray], Begun | None]
+
+
 def attribute(
     bench: Bench,
     unknowns: Unknowns,
@@ -110,14 +129,16 @@ def attribute(
     most: int = 3,
     machine: Machine = NO_MACHINE,
     deep: bool = True,
-    following: Following | None = None,
+    begin: Begin = lambda _weights, _base, _held: None,
+    settled: float = 0.0,
     say: Say = lambda _: None,
 ) -> Attribution | None:
     """Find the effects; None if the model does not run.
 
     ``start``: what the same unknowns were fitted to before, on the same recordings (default: from the drawing).
     ``machine``: whose orders the ripples keep to. ``deep``: further starts, larger sizes, other forms and rivals count.
-    ``following``: what keeps the model in step where it sticks and slips.
+    ``begin``: what is found in another way first. ``settled``: structure, in standard deviations of the noise, which is
+    not looked into any more beside an effect, nor for it whether a known order is free.
     """
     say("fitting the declared model")
     base = refine(
@@ -139,21 +160,26 @@ def attribute(
     current, current_held = base, held
     rounds: list[Round] = []
     accepted: list[Scored] = []
-    for _ in range(most):
+    begun = begin(weights, base, held)
+    if begun is not None:
+        rounds, accepted, current, current_held = [*begun.rounds], [*begun.accepted], begun.fit, begun.held
+    for _ in range(0 if begun is not None and not begun.goes_on else most):
         if accepted and weights.left(current_held) < SMALLEST_STRUCTURE**2:
+            break
+        if accepted and settled and not leaves_structure(bench, weights, current_held, settled):
             break
         beside = f" beside {accepted[-1].candidate.name}" if accepted else ""
         say(f"screening {len(candidates)} candidates{beside}")
         offered: Sequence[Candidate] = candidates
         while offered:
-            selection = Selection(bench, weights, current, current_held, say, following)
+            selection = Selection(bench, weights, current, current_held, say)
             free = [c for c in offered if not any(_is_taken(c, s.candidate) for s in accepted)]
             left = [c for c in free if not _is_known(c, current)]
             rounds.append(
                 _round(
                     selection,
                     left,
-                    scan,
+                    scan(current),
                     seed + len(rounds),
                     accepted,
                     offered is candidates,
@@ -169,14 +195,20 @@ def attribute(
             fit, reweighed = weights.weigh(choice.fit)
             if reweighed is None:
                 return None
-            choice, fit, current_held = freed(bench, weights, choice, (fit, reweighed), say)
+            current_held = reweighed
+            if not settled:
+                choice, fit, current_held = freed(bench, weights, choice, (fit, reweighed), say)
             rounds[-1] = rounds[-1].with_accepted(choice)
             accepted.append(choice)
             current = fit
             offered = further_parts(choice.candidate, candidates)
         if offered is candidates:
             break
-    accepted, current, current_held, notes = prune(bench, unknowns, weights, accepted, current, current_held)
+    notes: list[str] = []
+    if not settled:
+        accepted, current, current_held, notes = prune(
+            bench, unknowns, weights, accepted, current, current_held
+        )
     kept = _within_range(bench, accepted, base, current, current_held)
     if kept is None:
         return None
@@ -190,7 +222,7 @@ def attribute(
         weights.plain(weights.base_held, "validate"),
         weights.plain(current_held, "validate"),
         bench.factors("fit"),
-        (*notes, *ended),
+        (*(begun.notes if begun is not None else ()), *notes, *ended),
     )
 
 
@@ -236,7 +268,7 @@ def _is_taken(candidate: Candidate, accepted: Candidate) -> bool:
 def _round(
     selection: Selection,
     offered: Sequence[Candidate],
-    scan: Scan,
+    waves: Mapping[str, Sequence[float]],
     seed: int,
     accepted: Sequence[Scored],
     whole: bool,
@@ -245,9 +277,7 @@ def _round(
 ) -> Round:
     """Screen what is ``offered`` (``whole``: all effects, else parts of the last one), refine the best, choose one."""
     proposals = on_orders(
-        screen(selection.bench, selection.current, offered, scan(selection.current)),
-        machine,
-        selection.current,
+        screen(selection.bench, selection.current, offered, waves), machine, selection.current
     )
     gains = largest_gains(selection.current, proposals, seed)
     limit = threshold(gains)
@@ -261,11 +291,6 @@ def _round(
         gains = largest_gains(selection.current, proposals, seed)
         limit = threshold(gains)
     choice, objections = selection.choose(scored, limit, not accepted, not whole)
-    if deep and selection.sticks and (choice is None or out_of_range(choice.fit)):
-        scored = selection.refined_in_step(offered, scan, machine, scored)
-        choice, objections = selection.choose(scored, limit, not accepted, not whole)
-        if choice is not None and choice.proposal not in proposals:
-            proposals = [choice.proposal, *proposals]
     rivals: tuple[Scored, ...] = ()
     forms: tuple[Scored, ...] = ()
     if choice is not None and deep and whole:

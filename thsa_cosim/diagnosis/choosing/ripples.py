@@ -10,7 +10,8 @@ from dataclasses import replace
 from thsa_cosim.diagnosis.choosing.gates import NEXT_SHARE, SIGMAS, out_of_range
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored
-from thsa_cosim.diagnosis.choosing.screen import Proposal, Say
+from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.choosing.selection import Say
 from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE, is_visible
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
@@ -45,7 +46,7 @@ def freed(
     ``found``: the fit of the model with it and its held-out residuals (N,); those that count come back.
     """
     fit, held = found
-    if not choice.proposal.held or not _leaves_structure(bench, weights, held):
+    if not choice.proposal.held or not leaves_structure(bench, weights, held):
         return choice, *found
     say(f"fitting {choice.candidate.name} with a free order")
     proposal = replace(choice.proposal, held=frozenset())
@@ -63,6 +64,8 @@ def freed(
     return replace(choice, proposal=proposal, fit=free, validate=validate), free, validate
 
 
-def _leaves_structure(bench: Bench, weights: ChannelWeights, held: FloatArray) -> bool:
-    """Whether the verdict on the held-out residuals (N,) would be that something is left."""
-    return is_visible(errors(bench.of("validate"), weights.plain(held, "validate")), VISIBLE_BESIDE)
+def leaves_structure(
+    bench: Bench, weights: ChannelWeights, held: FloatArray, size: float = VISIBLE_BESIDE
+) -> bool:
+    """Whether the held-out residuals (N,) hold structure of ``size``, by default as the verdict counts it."""
+    return is_visible(errors(bench.of("validate"), weights.plain(held, "validate")), size)

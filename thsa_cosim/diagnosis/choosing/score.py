@@ -1,6 +1,6 @@
 """One candidate fitted together with the declared parameters, and its score on the held-out recordings."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +8,6 @@ import numpy as np
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.bench import Bench
-from thsa_cosim.diagnosis.fitting.continuation import InStep, is_stuck
 from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
 from thsa_cosim.diagnosis.fitting.structure import block_squares, consistency, relative_consistency, structure
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
@@ -90,11 +89,11 @@ def score(
     return None if fit is None else judge(bench, proposal, fit.sharing(current.jacobian), current, held)
 
 
-def go_on(bench: Bench, one: Scored, current: Fit, held: FloatArray, iterations: int = 4) -> Scored:
+def go_on(bench: Bench, scored: Scored, current: Fit, held: FloatArray, iterations: int = 4) -> Scored:
     """The same with further iterations, the Jacobian's columns of the declared parameters kept as in `score`."""
-    fit = one.fit
+    fit = scored.fit
     if fit.converged:
-        return one
+        return scored
     again = refine(
         bench,
         fit.unknowns,
@@ -107,9 +106,9 @@ def go_on(bench: Bench, one: Scored, current: Fit, held: FloatArray, iterations:
         enough=3.0,
     )
     if again is None:
-        return one
+        return scored
     again = again if fit.shared is None else again.sharing(fit.shared)
-    return judge(bench, one.proposal, again, current, held) or one
+    return judge(bench, scored.proposal, again, current, held) or scored
 
 
 def judge(bench: Bench, proposal: Proposal, fit: Fit, current: Fit, held: FloatArray) -> Scored | None:
@@ -131,25 +130,14 @@ def judge(bench: Bench, proposal: Proposal, fit: Fit, current: Fit, held: FloatA
     )
 
 
-def polish(
-    bench: Bench,
-    choice: Scored,
-    current: Fit,
-    held: FloatArray,
-    in_step: Callable[[], InStep | None] = lambda: None,
-) -> Scored:
+def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scored:
     """The same with every Jacobian column fresh, and once more with the declared parameters from the drawing.
 
     A missing effect bends the declared parameters; from there an effect that acts by contact may not find its optimum.
-    A fit that is stuck goes on ``in_step``.
     """
     unknowns = choice.fit.unknowns
     fits = [refine(bench, unknowns, choice.fit.vector, steps=choice.fit.steps)]
-    follower = in_step() if fits[0] is not None and is_stuck(fits[0]) else None
-    if follower is not None and fits[0] is not None:
-        drawn = unknowns.at_drawing(choice.fit.vector)
-        fits.append(follower.fit(unknowns, drawn, to_beat=fits[0].misfit))
-    elif fits[0] is None or _is_bent(bench, fits[0]) or fits[0].misfit > ENOUGH * fits[0].residual.size:
+    if fits[0] is None or _is_bent(bench, fits[0]) or fits[0].misfit > ENOUGH * fits[0].residual.size:
         known = np.inf if fits[0] is None else fits[0].cost
         near, steps = (choice.fit if fits[0] is None else fits[0]).jacobian, choice.fit.steps
         drawn = unknowns.at_drawing(choice.fit.vector)

@@ -6,7 +6,7 @@ residuals that the candidate's best combination promises (the score test, Rao 19
 """
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,9 +17,6 @@ from thsa_cosim.diagnosis.fitting.bench import AT_ONCE, Bench
 from thsa_cosim.diagnosis.fitting.fit import RESPONSE, Fit
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 from thsa_cosim.signals import FloatArray
-
-#: Tells who waits what is being done.
-Say = Callable[[str], None]
 
 _WANTED = 3.0 * RESPONSE
 _ROWS = 20_000

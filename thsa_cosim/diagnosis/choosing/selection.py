@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.gates import (
     SIGMAS,
     SMALLEST_STRUCTURE,
@@ -18,17 +17,13 @@ from thsa_cosim.diagnosis.choosing.gates import (
     out_of_range,
     signal_share,
 )
-from thsa_cosim.diagnosis.choosing.in_step import Scan, found_in_step
-from thsa_cosim.diagnosis.choosing.orders import Machine
-from thsa_cosim.diagnosis.choosing.score import Scored, go_on, judge, leaves_little, polish, score
-from thsa_cosim.diagnosis.choosing.screen import Proposal, Say
+from thsa_cosim.diagnosis.choosing.score import Scored, go_on, leaves_little, polish, score
+from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.choosing.sizes import at_sizes, is_led_astray
 from thsa_cosim.diagnosis.choosing.starts import PROMISING, further_starts
 from thsa_cosim.diagnosis.choosing.verdict import VISIBLE, VISIBLE_BESIDE, is_visible
 from thsa_cosim.diagnosis.fitting.bench import Bench
-from thsa_cosim.diagnosis.fitting.continuation import InStep, is_stuck
 from thsa_cosim.diagnosis.fitting.fit import Fit
-from thsa_cosim.diagnosis.fitting.following import Following
 from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, errors
 from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
@@ -54,6 +49,8 @@ HALF = 0.5
 WAVES = 6
 #: A further start is refined if it promises this much more than the candidate's starts before.
 BETTER = 1.05
+
+Say = Callable[[str], None]
 
 
 def worth_refining(proposals: Sequence[Proposal], limit: float) -> list[Proposal]:
@@ -164,7 +161,6 @@ class Selection:
     current: Fit
     held: FloatArray
     say: Say = lambda _: None
-    following: Following | None = None
     _polished: dict[int, Scored] = field(default_factory=dict)
 
     def refined(self, proposals: Sequence[Proposal], limit: float) -> list[Scored]:
@@ -351,36 +347,8 @@ class Selection:
         """A candidate fitted with all parameters, once."""
         key = id(one.proposal)
         if key not in self._polished:
-            self._polished[key] = polish(self.bench, one, self.current, self.held, self.in_step)
+            self._polished[key] = polish(self.bench, one, self.current, self.held)
         return self._polished[key]
-
-    def in_step(self) -> InStep | None:
-        """What fits a machine that sticks and slips; None where no place can follow a measured speed."""
-        if self.following is None:
-            return None
-        self.say("keeping the model in step with the measured speed")
-        gain = self.following.gain(self.current.unknowns, self.current.vector)
-        return None if gain is None else InStep(self.bench, self.following, gain)
-
-    @property
-    def sticks(self) -> bool:
-        """Whether the model so far, or one that was fitted with all parameters, is stuck off its optimum."""
-        return any(is_stuck(fit) for fit in (self.current, *(s.fit for s in self._polished.values())))
-
-    def refined_in_step(
-        self, offered: Sequence[Candidate], scan: Scan, machine: Machine, judged: Sequence[Scored]
-    ) -> list[Scored]:
-        """``judged`` and what of ``offered`` explains most in step, fitted freely; best first."""
-        in_step = self.in_step()
-        if in_step is None:
-            return list(judged)
-        found = []
-        for proposal, fit in found_in_step(in_step, self.current, offered, scan, machine, self.say):
-            one = judge(self.bench, proposal, fit, self.current, self.held)
-            if one is not None:
-                self._polished[id(proposal)] = one
-                found.append(one)
-        return sorted([*judged, *found], key=lambda s: -s.held_out_gain)
 
     def _whole(self, one: Scored) -> Scored:
         self.say(f"fitting {one.candidate.name} with all parameters")

@@ -28,7 +28,7 @@ from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute, pr
 from thsa_cosim.diagnosis.choosing.findings import values_of
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes, held_shapes
-from thsa_cosim.diagnosis.choosing.screen import Say
+from thsa_cosim.diagnosis.choosing.selection import Say
 from thsa_cosim.diagnosis.choosing.verdict import VISIBLE
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.fitting.bench import Bench

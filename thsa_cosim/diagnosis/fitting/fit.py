@@ -133,17 +133,6 @@ def cost_of(unknowns: Unknowns, vector: FloatArray, residual: FloatArray) -> flo
     return float(residual @ residual + prior @ prior)
 
 
-def promise(fit: Fit) -> float:
-    """Decrease of the cost that the linear model at a fit promises, within the bounds; about 0 at an optimum."""
-    unknowns, scale = fit.unknowns, fit.unknowns.scale
-    information = fit.information
-    gradient = fit.jacobian.T @ fit.residual + unknowns.prior(fit.vector) * unknowns.precision * scale
-    diagonal = np.diag(information).copy()
-    diagonal[diagonal <= 0.0] = 1.0
-    step = (_bounded(fit, information + np.diag(1e-6 * diagonal), gradient) - fit.vector) / scale
-    return float(-2.0 * gradient @ step - step @ information @ step)
-
-
 def columns(
     bench: Bench,
     unknowns: Unknowns,

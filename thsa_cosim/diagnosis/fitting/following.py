@@ -29,8 +29,8 @@ SAME = 1e-6
 MEANS = 5
 #: Gains are tried in these steps of the place's rms load over its largest speed, ...
 STEPS = tuple(float(g) for g in 10.0 ** np.arange(0.0, 4.5, 0.5))
-#: ... until the model leaves this many times the noise in the signal that it follows.
-IN_STEP = 1.0
+#: ... of which the least counts that leaves no more than this many times what the largest leaves in the signal.
+IN_STEP = 1.05
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class Followed:
 class Following:
     """The recordings with the measured speed as a further input of the superset; opens its processes when asked.
 
-    A context manager. ``signals_at``: start values by case → the slots' signals, by case; ``open_runner``: experiments
-    → the processes that run them.
+    A context manager. ``signals_at``: start values by case → the signals of slots and outputs, by case;
+    ``open_runner``: experiments → the processes that run them.
     """
 
     def __init__(
@@ -78,10 +78,7 @@ class Following:
             self._asked = True
             trials = self._bench.of("fit")
             values = {t.case.name: unknowns.assignments(vector, t.group) for t in trials}
-            places = self._signals_at(values)
-            outputs = self._bench.signals(unknowns, vector)
-            shown = {t.case.name: s for t in trials if (s := outputs[t.name]) is not None}
-            self._followed = find_followed(self._slots, trials, places, shown)
+            self._followed = find_followed(self._slots, trials, self._signals_at(values))
         return self._followed
 
     def at(self, gain: float) -> Bench:
@@ -94,47 +91,45 @@ class Following:
         return self._bench.beside(*self._opened, {self._followed.slot.gain: gain})
 
     def gain(self, unknowns: Unknowns, vector: FloatArray) -> float | None:
-        """The least gain by which the model follows within the noise; found at the given vector (n,), once.
+        """The least gain by which the model follows as well as it can; found at the given vector (n,), once.
 
-        None where no place can follow, or none does.
+        None where no place can follow.
         """
         if not self._gain:
-            self._gain.append(self._least_gain(unknowns, vector))
+            followed = self.followed(unknowns, vector)
+            left = {} if followed is None else self._left(followed, unknowns, vector)
+            near = [gain for gain, rms in left.items() if rms <= IN_STEP * left[max(left)]]
+            self._gain.append(min(near, default=None))
         return self._gain[0]
 
-    def _least_gain(self, unknowns: Unknowns, vector: FloatArray) -> float | None:
-        followed = self.followed(unknowns, vector)
-        if followed is None:
-            return None
-        for step in STEPS:
-            bench = self.at(step * followed.unit_gain)
+    def _left(self, followed: Followed, unknowns: Unknowns, vector: FloatArray) -> dict[float, float]:
+        """By gain the rms of what the model leaves in the signal that it follows, in standard deviations."""
+        found = {}
+        for gain in (step * followed.unit_gain for step in STEPS):
+            bench = self.at(gain)
             (residual,) = bench.residuals(unknowns, vector[None, :], "fit")
-            if residual is None:
-                continue
-            parts = split(bench.of("fit"), residual / bench.factors("fit"))[followed.channel]
-            if float(np.mean(np.concatenate(parts) ** 2)) < IN_STEP**2:
-                return step * followed.unit_gain
-        return None
+            if residual is not None:
+                parts = split(bench.of("fit"), residual / bench.factors("fit"))[followed.channel]
+                found[gain] = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+        return found
 
 
 def find_followed(
-    slots: Sequence[Slot],
-    trials: Sequence[Trial],
-    places: Mapping[str, Signals],
-    outputs: Mapping[str, Signals],
+    slots: Sequence[Slot], trials: Sequence[Trial], signals: Mapping[str, Signals]
 ) -> Followed | None:
-    """The first place whose speed a compared signal shows, by simulations of the slots and of the outputs, by case."""
-    common = [t for t in trials if t.case.name in places and t.case.name in outputs]
-    for slot in (s for s in slots if s.interface == INJECTED):
+    """The first place whose speed a compared signal shows.
+
+    ``signals``: simulated ones of slots and outputs, by case.
+    """
+    runs = [run for t in trials if (run := signals.get(t.case.name)) is not None]
+    for slot in (s for s in slots if s.interface == INJECTED and runs):
+        speeds = [run[f"{slot.component}.v"] for run in runs]
+        largest = max(float(np.max(np.abs(speed))) for speed in speeds)
+        load = float(np.sqrt(np.mean(np.concatenate([run[f"{slot.component}.N"] for run in runs]) ** 2)))
         for channel in (c.name for c in trials[0].case.channels):
-            speeds = [places[t.case.name][f"{slot.component}.v"] for t in common]
-            shown = [outputs[t.case.name][channel] for t in common]
-            apart = [float(np.max(np.abs(a - b))) for a, b in zip(speeds, shown, strict=True)]
-            largest = max((float(np.max(np.abs(b))) for b in shown), default=0.0)
-            if common and largest > 0.0 and max(apart) < SAME * largest:
-                loads = np.concatenate([places[t.case.name][f"{slot.component}.N"] for t in common])
-                load = float(np.sqrt(np.mean(loads**2)))
-                return Followed(slot, channel, load / largest) if load > 0.0 else None
+            apart = max(float(np.max(np.abs(v - run[channel]))) for v, run in zip(speeds, runs, strict=True))
+            if apart < SAME * largest and load > 0.0:
+                return Followed(slot, channel, load / largest)
     return None
 
 

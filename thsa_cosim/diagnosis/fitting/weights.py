@@ -5,6 +5,8 @@ section 7.4): a channel whose rms exceeds the noise counts as if that were its n
 up every error of speed, decides alone as long as an effect is missing.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from thsa_cosim.diagnosis.fitting.bench import Bench
@@ -30,15 +32,19 @@ class ChannelWeights:
         for name, parts in split(bench.of("fit"), self.plain(fit.residual, "fit")).items():
             after[name] = 1.0 / max(1.0, float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
         if any(not 1.0 / SAME < after[name] / before.get(name, 1.0) < SAME for name in after):
-            plain = self.plain(self.base_held, "validate") if self.base_held.size else self.base_held
             factors = bench.factors("fit")
-            bench.weights = after
-            if plain.size:
-                self.base_held = plain * bench.factors("validate")
+            self.take(after)
             jacobian = fit.jacobian_of(fit.unknowns, bench.factors("fit") / factors)
             again = refine(bench, fit.unknowns, fit.vector, jacobian=jacobian, steps=fit.steps, near=True)
             fit = fit if again is None else again
         return fit, bench.residuals(fit.unknowns, fit.vector[None, :], "validate")[0]
+
+    def take(self, weights: Mapping[str, float]) -> None:
+        """Have the bench weigh by ``weights``, by channel."""
+        plain = self.plain(self.base_held, "validate") if self.base_held.size else self.base_held
+        self._bench.weights = weights
+        if plain.size:
+            self.base_held = plain * self._bench.factors("validate")
 
     def plain(self, residual: FloatArray, part: Part) -> FloatArray:
         """``residual`` (N,) without the weights, in standard deviations of the noise."""

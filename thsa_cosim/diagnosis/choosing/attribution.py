@@ -205,14 +205,15 @@ def attribute(
         if offered is candidates:
             break
     notes: list[str] = []
-    if not settled:
+    if not settled:  # else what is left may be what bends the model
         accepted, current, current_held, notes = prune(
             bench, unknowns, weights, accepted, current, current_held
         )
-    kept = _within_range(bench, accepted, base, current, current_held)
-    if kept is None:
-        return None
-    accepted, current, current_held, ended = kept
+        kept = _within_range(bench, accepted, base, current, current_held)
+        if kept is None:
+            return None
+        accepted, current, current_held, ended = kept
+        notes += ended
     return Attribution(
         base,
         base_cost,
@@ -222,7 +223,7 @@ def attribute(
         weights.plain(weights.base_held, "validate"),
         weights.plain(current_held, "validate"),
         bench.factors("fit"),
-        (*(begun.notes if begun is not None else ()), *notes, *ended),
+        (*(begun.notes if begun is not None else ()), *notes),
     )
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
-from thsa_cosim.diagnosis.choosing.attribution import Begun, Round, Scan, attribute
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, Begun, Round, Scan, attribute
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, threshold
-from thsa_cosim.diagnosis.choosing.gates import insignificant, out_of_range
+from thsa_cosim.diagnosis.choosing.gates import SIGMAS, insignificant, out_of_range
 from thsa_cosim.diagnosis.choosing.observer import order_in_step
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.ripples import leaves_structure, on_orders
@@ -90,7 +90,7 @@ class InStep:
             seed=self.seed,
             machine=self.machine,
             deep=False,
-            begin=lambda w, b, h: self._ripples(stepped, followed, gain, w, b, h),
+            begin=lambda w, b, h: self._ripple(stepped, followed, gain, w, b, h),
             settled=SETTLED,
             say=self.say,
         )
@@ -99,13 +99,14 @@ class InStep:
         self.say("letting the model run freely")
         before, left = self.bench.weights, weights.left(held)
         weights.take(stepped.weights)
-        fit = released(self.bench, self.following, gain, found.final)
+        whole = self._whole(stepped, followed, gain, found)
+        fit = released(self.bench, self.following, gain, whole.fit)
         if fit is not None:
-            accepted, fit = self._needed(found.accepted, fit)
+            accepted, fit = self._needed(whole.accepted, fit)
             fit, own = weights.weigh(fit)
             if own is not None and not out_of_range(fit) and weights.left(own) < left:
                 # A free run that falls out of step now and then says little of what else there may be.
-                return Begun(found.rounds, accepted, fit, own, goes_on=False, notes=(NOTE,))
+                return Begun(whole.rounds, accepted, fit, own, goes_on=False, notes=(NOTE,))
         weights.take(before)
         return None
 
@@ -122,7 +123,7 @@ class InStep:
                     accepted, fit = kept, again
         return accepted, fit
 
-    def _ripples(
+    def _ripple(
         self,
         stepped: Bench,
         followed: Followed,
@@ -131,49 +132,60 @@ class InStep:
         base: Fit,
         held: FloatArray,
     ) -> Begun | None:
-        """The ripple at the followed place whose order the force shows, with its second harmonic."""
+        """The ripple at the followed place whose order the force shows, if nothing outweighs it."""
         order, _share = order_in_step(stepped, followed, gain, base)
-        begun: Begun | None = None
-        current = base
-        for harmonic in (False, True):
-            proposals = self._proposals(stepped, followed, order, current)
-            if not proposals:
-                break
-            self.say(f"fitting {proposals[0].label} in step")
-            if harmonic:  # of which hardly anything is to be seen in step: the free run tells
-                one = judge(stepped, proposals[0], _beside(current, proposals[0]), current, held)
-            else:  # what else is missing may outweigh it so far: the force has told
-                one = score(stepped, current, held, proposals[0])
-                one = (
-                    None
-                    if one is None
-                    else refit(stepped, proposals[0], current, held, one.fit.unknowns, one.fit.vector)
-                )
-            if one is None:
-                break
-            gains, factors = largest_gains(current, proposals, self.seed), stepped.factors("fit")
-            made = Round(threshold(gains), tuple(proposals), (one,), one, ("",), (), gains, factors)
-            current, own = weights.weigh(one.fit)
-            if own is None:
-                break
-            held = own
-            before = ((), ()) if begun is None else (begun.rounds, begun.accepted)
-            begun = Begun((*before[0], made), (*before[1], one), current, held)
-        return begun
+        made = self._added(stepped, followed, order, base, held)
+        if made is None or (one := made.accepted) is None:
+            return None
+        if min(one.fit_gain, one.held_out_gain) < made.threshold or one.consistency < SIGMAS:
+            return None
+        fit, own = weights.weigh(one.fit)
+        return None if own is None else Begun((made,), (one,), fit, own)
 
-    def _proposals(self, stepped: Bench, followed: Followed, order: float, current: Fit) -> list[Proposal]:
-        """The ripples of the followed place at an order, best first; their harmonics once they are in the model."""
-        known = current.unknowns.named(current.vector)
+    def _whole(self, stepped: Bench, followed: Followed, gain: float, found: Attribution) -> Begun:
+        """What was found, the ripple if that was outweighed, and its second harmonic, neutral.
+
+        The harmonic hardly shows in step; the free run tells whether it is needed.
+        """
+        rounds, accepted, fit = found.rounds, found.accepted, found.final
+        order, _share = order_in_step(stepped, followed, gain, fit)
+        for harmonic in (False, True):
+            held = stepped.residuals(fit.unknowns, fit.vector[None, :], "validate")[0]
+            made = None if held is None else self._added(stepped, followed, order, fit, held, harmonic)
+            if made is not None and made.accepted is not None:
+                rounds, accepted, fit = (*rounds, made), (*accepted, made.accepted), made.accepted.fit
+        return Begun(rounds, accepted, fit, found.final_validate)
+
+    def _added(
+        self,
+        stepped: Bench,
+        followed: Followed,
+        order: float,
+        fit: Fit,
+        held: FloatArray,
+        harmonic: bool = False,
+    ) -> Round | None:
+        """A ripple of the followed place beside ``fit``, or the ``harmonic`` of the one that it has, as a round."""
+        known = fit.unknowns.named(fit.vector)
         rows = []
         for candidate in (c for c in self.candidates if c.slot.name == followed.slot.name):
             waves = [p for p in candidate.shapes if p.scanned]
-            fitted = any(p.variable in known for p in candidate.coefficients)
-            harmonic = all(p.variable in known for p in waves)
-            if (
-                waves
-                and not fitted
-                and harmonic == candidate.variant.beside
-                and not candidate.variant.instead
-            ):
+            is_new = not any(p.variable in known for p in candidate.coefficients)
+            is_harmonic = candidate.variant.beside and all(p.variable in known for p in waves)
+            plain = not candidate.variant.beside and not candidate.variant.instead
+            if waves and is_new and (is_harmonic if harmonic else plain):
                 rows.append((candidate, {p.name: known.get(p.variable, order) for p in waves}))
-        return on_orders(propose(stepped, current, rows), self.machine, current)
+        proposals = on_orders(propose(stepped, fit, rows), self.machine, fit)
+        if not proposals:
+            return None
+        best = proposals[0]
+        self.say(f"fitting {best.label} in step")
+        if harmonic:
+            one = judge(stepped, best, _beside(fit, best), fit, held)
+        else:
+            one = score(stepped, fit, held, best)
+            one = one and refit(stepped, best, fit, held, one.fit.unknowns, one.fit.vector)
+        if one is None:
+            return None
+        gains, factors = largest_gains(fit, proposals, self.seed), stepped.factors("fit")
+        return Round(threshold(gains), tuple(proposals), (one,), one, ("",), (), gains, factors)

@@ -94,7 +94,7 @@ class InStep:
             settled=SETTLED,
             say=self.say,
         )
-        if found is None or not found.accepted:
+        if found is None:
             return None
         self.say("letting the model run freely")
         before, left = self.bench.weights, weights.left(held)
@@ -105,8 +105,9 @@ class InStep:
             accepted, fit = self._needed(whole.accepted, fit)
             fit, own = weights.weigh(fit)
             if own is not None and not out_of_range(fit) and weights.left(own) < left:
-                # A free run that falls out of step now and then says little of what else there may be.
-                return Begun(whole.rounds, accepted, fit, own, goes_on=False, notes=(NOTE,))
+                # A free run that falls out of step now and then says little of what else is left, if that is little.
+                more = leaves_structure(self.bench, weights, own, SETTLED)
+                return Begun(whole.rounds, accepted, fit, own, goes_on=more, notes=(NOTE,))
         weights.take(before)
         return None
 

@@ -105,9 +105,8 @@ class InStep:
             accepted, fit = self._needed(whole.accepted, fit)
             fit, own = weights.weigh(fit)
             if own is not None and not out_of_range(fit) and weights.left(own) < left:
-                # A free run that falls out of step now and then says little of what else is left, if that is little.
-                more = leaves_structure(self.bench, weights, own, SETTLED)
-                return Begun(whole.rounds, accepted, fit, own, goes_on=more, notes=(NOTE,))
+                # A free run that falls out of step now and then says little of what else there may be.
+                return Begun(whole.rounds, accepted, fit, own, goes_on=False, notes=(NOTE,))
         weights.take(before)
         return None
 

@@ -103,7 +103,7 @@ class Attribution:
 class Begun:
     """What was found before the first screening: its rounds, the effects, the model's fit with them, and what to note.
 
-    ``held`` (N,): its held-out residuals. ``goes_on``: whether further effects are looked for beside it.
+    ``held`` (N,): its held-out residuals. ``goes_on``: whether further effects are looked for then.
     """
 
     rounds: tuple[Round, ...]

@@ -1,7 +1,7 @@
 """A machine that a ripple makes stick and slip: its effects are found with the model kept in step, then freed.
 
-The order of the ripple comes from the force that keeps the model in step (`observer`), its size and phase, and what is
-missing beside it, from fits in step; from there they are continued to the free run, which judges.
+The order of the ripple comes from the force that keeps the model in step (`observer`); its size and phase, and what
+else is missing, from fits in step. From there they are continued to the free run, which judges.
 """
 
 from collections.abc import Sequence

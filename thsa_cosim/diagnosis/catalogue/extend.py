@@ -45,7 +45,8 @@ def extended_class(
         for name, slot in slots.items()
     ]
     inputs = [
-        f'  THSA.Interfaces.RealInput {slots[name].measured} "Measured speed: {name}"\n' for name in injected
+        f'  THSA.Interfaces.RealInput {slots[name].measured} "Measured speed: {name}";\n'
+        for name in sorted(injected)
     ]
     redeclared = ",\n    ".join(
         f"redeclare {_block_name(slot)} {slot.component}"
@@ -54,7 +55,7 @@ def extended_class(
     )
     return (
         f'within ;\n{beside}model {name} "{description or base}"\n'
-        + "".join([*blocks, *(line.replace("\n", ";\n") for line in sorted(inputs))])
+        + "".join([*blocks, *inputs])
         + f"  extends {base}(\n    {redeclared});\nend {name};\n"
     )
 

@@ -73,8 +73,10 @@ class InStep:
         if not leaves_structure(self.bench, weights, held):
             return None
         followed = self.following.followed(self.unknowns, base.vector)
+        if followed is None or not followed.slot.is_angular:
+            return None
         gain = self.following.gain(self.unknowns, base.vector)
-        if gain is None or followed is None or not followed.slot.is_angular:
+        if gain is None:
             return None
         stepped = self.following.at(gain)
         order, share = order_in_step(stepped, followed, gain, base)
@@ -148,12 +150,12 @@ class InStep:
         The harmonic hardly shows in step; the free run tells whether it is needed.
         """
         rounds, accepted, fit = found.rounds, found.accepted, found.final
+        held = found.final_validate * stepped.factors("validate")
         order, _share = order_in_step(stepped, followed, gain, fit)
         for harmonic in (False, True):
-            held = stepped.residuals(fit.unknowns, fit.vector[None, :], "validate")[0]
-            made = None if held is None else self._added(stepped, followed, order, fit, held, harmonic)
-            if made is not None and made.accepted is not None:
-                rounds, accepted, fit = (*rounds, made), (*accepted, made.accepted), made.accepted.fit
+            made = self._added(stepped, followed, order, fit, held, harmonic)
+            if made is not None and (one := made.accepted) is not None:
+                rounds, accepted, fit, held = (*rounds, made), (*accepted, one), one.fit, one.validate
         return Begun(rounds, accepted, fit, found.final_validate)
 
     def _added(

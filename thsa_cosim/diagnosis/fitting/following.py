@@ -56,7 +56,7 @@ class Following:
         signals_at: Callable[[Mapping[str, Mapping[str, float]]], Mapping[str, Signals]],
         open_runner: Callable[[Sequence[Experiment]], Runner],
     ) -> None:
-        self._bench, self._slots = bench, slots
+        self._bench, self._slots = bench, [s for s in slots if s.interface == INJECTED]
         self._signals_at, self._open_runner = signals_at, open_runner
         self._stack = ExitStack()
         self._opened: tuple[Runner, tuple[Trial, ...]] | None = None
@@ -74,7 +74,7 @@ class Following:
 
     def followed(self, unknowns: Unknowns, vector: FloatArray) -> Followed | None:
         """The place that can follow a measured speed, if there is one; found at the given vector (n,), once."""
-        if not self._asked:
+        if self._slots and not self._asked:
             self._asked = True
             trials = self._bench.of("fit")
             values = {t.case.name: unknowns.assignments(vector, t.group) for t in trials}

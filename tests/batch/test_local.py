@@ -38,6 +38,14 @@ def printing_reducer(signals: Signals) -> FloatArray:
     return np.array([os.getpid()])
 
 
+def halves_in_single(signals: Signals) -> np.ndarray:
+    return np.full(40, 0.5, dtype=np.float32)
+
+
+def integers(signals: Signals) -> np.ndarray:
+    return np.arange(40)
+
+
 def experiment(name: str = "lag", fmu: Path | None = None, **options: object) -> Experiment:
     settings: dict[str, object] = {"reduce": last_value} | options
     return Experiment(name, fmu or build.lag2(), INPUTS, ("y",), TIME, **settings)  # type: ignore[arg-type]
@@ -467,3 +475,13 @@ def test_listening_by_threads_does_the_same(monkeypatch: pytest.MonkeyPatch) -> 
         outcomes = runner.run([fault("none" if kind == "good" else kind) for kind in kinds])
     wanted = [Status.OK if kind == "good" else FAULTS[kind][0] for kind in kinds]
     assert [o.status for o in outcomes] == wanted
+
+
+def test_what_a_reducer_returns_in_single_precision_travels_so_and_all_else_in_double():
+    experiments = [experiment("single", reduce=halves_in_single), experiment("integers", reduce=integers)]
+    with LocalRunner(experiments, workers=1) as runner:
+        single, whole = (o.reduced for o in runner.run([Job("single"), Job("integers")]))
+    assert single is not None
+    assert whole is not None
+    assert (single.dtype, whole.dtype) == (np.float32, np.float64)
+    assert (single[3], whole[3]) == (0.5, 3.0)

@@ -34,6 +34,9 @@ def test_residuals_are_in_units_of_noise_and_terms_their_squares() -> None:
     np.testing.assert_allclose(residuals(simulated), [2.0] * 11 + [2.0] * 8)
     np.testing.assert_allclose(TermsReducer(channels)(simulated), [44.0, 32.0])
     assert residuals.lengths == (11, 8)
+    single = ResidualReducer(channels, single=True)(simulated)
+    assert (single.dtype, residuals(simulated).dtype) == (np.float32, np.float64)
+    np.testing.assert_allclose(single, residuals(simulated), rtol=1e-7)
 
 
 def test_a_coarser_simulation_is_interpolated_onto_the_samples() -> None:

@@ -187,3 +187,11 @@ def test_too_many_reasons_are_summed_up_by_status() -> None:
     assert len(engine.failures) == 20
     engine.ask(BOWL, Request(Want.TERMS, np.array([[77.0, 0.0]])))
     assert engine.failures == {"crash": 21}
+
+
+def test_residuals_in_single_precision_are_stacked_in_double() -> None:
+    single = np.array([0.1, 0.2], dtype=np.float32)
+    found = stacked([Outcome(Status.OK, reduced=single)] * 2)
+    assert found is not None
+    assert found.dtype == np.float64
+    assert found.tolist() == 2 * single.astype(float).tolist()

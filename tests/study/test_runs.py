@@ -88,6 +88,9 @@ def test_what_is_read_is_what_was_written(tmp_path: Path) -> None:
     kept[b"s" * 16] = replace(outcome(7), signals=None)
     kept[b"l" * 16] = replace(outcome(8), reduced=np.random.default_rng(8).normal(size=(700, 3)))
     kept[b"e" * 16] = replace(outcome(9), signals=None, reduced=np.zeros(0))
+    single = np.random.default_rng(10).normal(size=700).astype(np.float32)
+    kept[b"4" * 16] = replace(outcome(10), reduced=single)
+    kept[b"5" * 16] = replace(outcome(11), signals=None, reduced=single)
     with RunLog.open(tmp_path / RUNS) as log:
         for key, value in kept.items():
             log.append(key, value)

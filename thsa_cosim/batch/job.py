@@ -3,11 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from thsa_cosim.signals import FloatArray, Signals
 
-Reducer = Callable[[Signals], FloatArray]
+Reducer = Callable[[Signals], NDArray[np.floating[Any]]]
 """Turns the signals of one run into an array (k,), inside the worker; must be picklable."""
 
 

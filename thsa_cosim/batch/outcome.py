@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thsa_cosim.fmu.failure import Status
-from thsa_cosim.signals import FloatArray, Signals
+from thsa_cosim.signals import Signals
 
 __all__ = ["Outcome", "Status"]
 
@@ -19,8 +20,8 @@ class Outcome:
     reason: str = ""
     """One sentence for a failed run, empty for a good one."""
     signals: Signals | None = None
-    reduced: FloatArray | None = None
-    """(k,) what the experiment's reducer returned."""
+    reduced: NDArray[np.floating[Any]] | None = None
+    """(k,) what the experiment's reducer returned, in single or double precision."""
     duration_s: float = 0.0
     """Wall time of the run in the worker; of a killed run, until it was killed."""
     console: str = ""

@@ -172,7 +172,9 @@ class Worker:
             if experiment.reduce is not None:
                 self._progress[0] = Phase.REDUCE
                 try:
-                    reduced = np.atleast_1d(np.asarray(experiment.reduce(signals), dtype=np.float64))
+                    reduced = np.atleast_1d(np.asarray(experiment.reduce(signals)))
+                    if reduced.dtype != np.float32:
+                        reduced = reduced.astype(np.float64, copy=False)
                 except Exception as error:
                     ours = isinstance(error, OSError) and is_machines(error)
                     status = Status.MACHINE if ours else Status.COST_ERROR

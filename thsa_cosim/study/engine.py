@@ -83,7 +83,7 @@ class Reply:
 def stacked(outcomes: Sequence[Outcome]) -> FloatArray | None:
     """What the workers made of the cases of a vector, one after the other (N,); None where one failed."""
     parts = [o.reduced for o in outcomes if o.ok and o.reduced is not None]
-    return np.concatenate(parts) if parts and len(parts) == len(outcomes) else None
+    return np.concatenate(parts, dtype=np.float64) if parts and len(parts) == len(outcomes) else None
 
 
 class Problem(Protocol):

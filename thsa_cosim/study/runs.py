@@ -5,8 +5,8 @@ of all that decides the outcome: the FMU's archive, inputs, times, start values,
 makes of the signals. A kill tears the last record at most, which is dropped when the log is opened again.
 
 Outcomes are kept up to ``LARGEST`` bytes and as far as the disk has room (``SHARE``): to write the residuals of a run
-takes a hundredth of simulating it. A diagnosis of a few long recordings comes to 0.3 to 1.5 GB, one that searches for
-an empirical law to more (3.4 GB were seen, residuals of 0.7 MB a run); it goes when the study is complete. The first
+takes a hundredth of simulating it. A diagnosis of a few long recordings comes to 0.2 to 0.8 GB, one that searches for
+an empirical law to more (residuals of 0.4 MB a run); it goes when the study is complete. The first
 runs are those that are kept: a continued study asks for them first. Timing apart, a recalled outcome is bit for bit the
 one that was returned.
 """
@@ -237,12 +237,16 @@ def _encoded(outcome: Outcome) -> list[bytes | memoryview]:
         "duration_s": outcome.duration_s,
         "console": outcome.console,
         "reduced": None if reduced is None else list(reduced.shape),
+        "single": reduced is not None and reduced.dtype == np.float32,
     }
     if signals is not None:
         meta["signals"] = {"names": list(signals.names), "units": dict(signals.units)}
         meta["signals"] |= {"held": sorted(signals.held), "n": signals.time.size}
     head = json.dumps(meta).encode()
-    body = [np.ascontiguousarray(a, dtype="<f8").reshape(-1) for a in _arrays(outcome)]
+    body = [
+        np.ascontiguousarray(a, dtype="<f4" if a is reduced and meta["single"] else "<f8").reshape(-1)
+        for a in _arrays(outcome)
+    ]
     return [struct.pack("<I", len(head)) + head, *(a.view(np.uint8).data for a in body if a.size)]
 
 
@@ -253,24 +257,25 @@ def _meta(content: bytes) -> tuple[dict[str, Any], int]:
 
 def _decoded(content: bytes) -> Outcome:
     meta, begin = _meta(content)
-    numbers = np.frombuffer(content, dtype="<f8", offset=begin).astype(np.float64)
-    signals, position = None, 0
+    signals = None
     if (kept := meta.get("signals")) is not None:
-        n = kept["n"]
-        columns = [numbers[k * n : (k + 1) * n] for k in range(len(kept["names"]) + 1)]
+        n, count = kept["n"], len(kept["names"]) + 1
+        numbers = np.frombuffer(content, dtype="<f8", count=n * count, offset=begin).astype(np.float64)
+        begin += numbers.nbytes
+        columns = [numbers[k * n : (k + 1) * n] for k in range(count)]
         signals = Signals(
             columns[0],
             dict(zip(kept["names"], columns[1:], strict=True)),
             kept["units"],
             frozenset(kept["held"]),
         )
-        position = n * len(columns)
     shape = meta["reduced"]
+    stored, dtype = ("<f4", np.float32) if meta.get("single") else ("<f8", np.float64)
     return Outcome(
         Status(meta["status"]),
         meta["reason"],
         signals,
-        None if shape is None else numbers[position:].reshape(shape),
+        None if shape is None else np.frombuffer(content, stored, offset=begin).astype(dtype).reshape(shape),
         meta["duration_s"],
         meta["console"],
     )

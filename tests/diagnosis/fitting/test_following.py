@@ -69,10 +69,19 @@ def test_the_least_gain_counts_that_follows_about_as_well_as_the_largest(monkeyp
         return opened[-1]
 
     own = bench(candidates("windage"), {})
-    left = {1.0: 9.0, 10.0: 2.0, 100.0: 1.04, 1000.0: 1.0}
+    asked: list[float] = []
+
+    def left(followed: Followed, gain: float, *_given: Any) -> float:
+        asked.append(gain / followed.unit_gain)
+        return 1.0 if asked[-1] == room.STEPS[-1] else 1.0 + 10.0 / asked[-1]
+
     with Following(own, [MOTOR], lambda _values: signals(u=SPEED), open_runner) as following:
-        monkeypatch.setattr(following, "_left", lambda *given: left)
-        assert following.gain(unknowns(), unknowns().start) == 100.0
+        monkeypatch.setattr(following, "_left", left)
+        unit = following.followed(unknowns(), unknowns().start)
+        assert unit is not None
+        found = following.gain(unknowns(), unknowns().start)
+        assert found == pytest.approx(next(s for s in room.STEPS if s >= 200.0) * unit.unit_gain)
+        assert len(asked) <= 5, "by bisection"
         assert not opened, "processes start when they are needed"
         first, second = following.at(1.0), following.at(2.0)
         assert (first._fixed, second._fixed) == ({"motorEffect.g_m": 1.0}, {"motorEffect.g_m": 2.0})

@@ -9,7 +9,7 @@ from thsa_cosim.batch import Job, Outcome, Runner
 from thsa_cosim.diagnosis.fitting.trials import Part, Trial
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.signals import FloatArray, Signals
-from thsa_cosim.study import Engine, Reply, Request, Want, stacked
+from thsa_cosim.study import Engine, Reply, Request, Want
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +55,9 @@ class Fitted:
         return jobs
 
     def judge(self, want: Want, outcomes: Sequence[Outcome]) -> tuple[float, FloatArray]:
-        """Sum of squared residuals; infinite if a simulation failed. It has no terms."""
-        residual = stacked(outcomes)
-        return np.inf if residual is None else float(residual @ residual), np.zeros(0)
+        """Sum of squared residuals, for the progress; infinite if a simulation failed. It has no terms."""
+        squares = [float(o.reduced @ o.reduced) for o in outcomes if o.ok and o.reduced is not None]
+        return sum(squares) if len(squares) == len(outcomes) else np.inf, np.zeros(0)
 
 
 #: Bytes of residuals that one batch of simulations returns: beside them there is at most one copy.
@@ -115,12 +115,14 @@ class Bench:
 
         Simulated minus measured, in standard deviations of the noise, times the channel's factor.
         """
-        trials, factors = self.of(part), self.factors(part)
-        count = max(1, AT_ONCE // (8 * factors.size))
+        trials = self.of(part)
+        factors = self.factors(part) if self.weights else None
+        samples = sum(channel.measured.size for trial in trials for channel in trial.case.channels)
+        count = max(1, AT_ONCE // (8 * samples))
         found: list[FloatArray | None] = []
         for first in range(0, len(vectors), count):
             reply = self._ask(Want.RESIDUALS, trials, unknowns, vectors[first : first + count])
-            found += [None if residual is None else residual * factors for residual in reply.residuals]
+            found += [r if r is None or factors is None else r * factors for r in reply.residuals]
         return found
 
     def signals(self, unknowns: Unknowns, vector: FloatArray) -> dict[str, Signals | None]:

@@ -7,6 +7,7 @@ observer (D. Luenberger, IEEE Transactions on Automatic Control 16 (1971) 596): 
 proportional to a gain, zero for the free run.
 """
 
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -97,21 +98,30 @@ class Following:
         """
         if not self._gain:
             followed = self.followed(unknowns, vector)
-            left = {} if followed is None else self._left(followed, unknowns, vector)
-            near = [gain for gain, rms in left.items() if rms <= IN_STEP * left[max(left)]]
-            self._gain.append(min(near, default=None))
+            self._gain.append(None if followed is None else self._least(followed, unknowns, vector))
         return self._gain[0]
 
-    def _left(self, followed: Followed, unknowns: Unknowns, vector: FloatArray) -> dict[float, float]:
-        """By gain the rms of what the model leaves in the signal that it follows, in standard deviations."""
-        found = {}
-        for gain in (step * followed.unit_gain for step in STEPS):
-            bench = self.at(gain)
-            (residual,) = bench.residuals(unknowns, vector[None, :], "fit")
-            if residual is not None:
-                parts = split(bench.of("fit"), residual / bench.factors("fit"))[followed.channel]
-                found[gain] = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
-        return found
+    def _least(self, followed: Followed, unknowns: Unknowns, vector: FloatArray) -> float | None:
+        """The more gain, the closer it follows: the least is found by bisection."""
+        gains = [step * followed.unit_gain for step in STEPS]
+        best = self._left(followed, gains[-1], unknowns, vector)
+        if not np.isfinite(best):
+            return None
+        near = bisect_left(
+            gains[:-1],
+            True,
+            key=lambda gain: self._left(followed, gain, unknowns, vector) <= IN_STEP * best,
+        )
+        return gains[near]
+
+    def _left(self, followed: Followed, gain: float, unknowns: Unknowns, vector: FloatArray) -> float:
+        """The rms of what the model leaves in the signal that it follows, in standard deviations; inf if it fails."""
+        bench = self.at(gain)
+        (residual,) = bench.residuals(unknowns, vector[None, :], "fit")
+        if residual is None:
+            return np.inf
+        parts = split(bench.of("fit"), residual / bench.factors("fit"))[followed.channel]
+        return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
 
 
 def find_followed(

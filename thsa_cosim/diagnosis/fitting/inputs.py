@@ -16,8 +16,8 @@ from thsa_cosim.diagnosis.fitting.trials import Trial
 from thsa_cosim.recordings.spline import LinearSpline
 from thsa_cosim.signals import FloatArray
 
-#: So many draws know a standard error to a fifth; of long recordings as many as memory should hold, and these at least.
-DRAWS, LEAST = 16, 4
+#: So many draws know a standard error to a quarter; of long recordings as many as memory should hold, at least these.
+DRAWS, LEAST = 8, 4
 #: A change of slope by this share of the largest slope is a knot.
 BEND = 1e-6
 

@@ -35,7 +35,7 @@ class Trial:
     @property
     def experiment(self) -> Experiment:
         """The simulation that returns residuals in standard deviations of the noise."""
-        return self.case.experiment(self.name, ResidualReducer(self.case.channels))
+        return self.case.experiment(self.name, ResidualReducer(self.case.channels, single=True))
 
     @property
     def name(self) -> str:

@@ -35,6 +35,13 @@ def test_empirical_law_is_an_equation_with_units_and_says_whether_it_was_added()
     assert "Empirical" not in printed(empirical=None)
 
 
+def test_laws_that_explain_as_much_as_the_effects_are_said():
+    term = {"slot": "currentSensor", "term": "u", "coefficient": -0.06, "unit": "1", "stderr": 3e-4}
+    text = printed(instead=[{"terms": [term], "parameters": {}}])
+    assert "from an empirical law in place of them: (-0.06 +- 0.0003) u at currentSensor." in text
+    assert "in place of them" not in printed()
+
+
 def test_not_tested_and_what_is_left_beside_an_effect_are_said():
     assert "No effect could be tried on this model" in printed(verdict="not-tested", effects=[])
     text = printed(verdict="unexplained-structure", unexplained=0.02)

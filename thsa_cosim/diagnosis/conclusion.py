@@ -33,6 +33,7 @@ from thsa_cosim.diagnosis.explaining.dependence import dependence
 from thsa_cosim.diagnosis.explaining.empirical import FoundLaw, LawSearch, law_of
 from thsa_cosim.diagnosis.explaining.evidence import evidence
 from thsa_cosim.diagnosis.explaining.experiment import separating_experiment
+from thsa_cosim.diagnosis.explaining.instead import rival_laws
 from thsa_cosim.diagnosis.explaining.slips import with_slips
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -45,7 +46,7 @@ from thsa_cosim.diagnosis.fitting.trials import (
 )
 from thsa_cosim.diagnosis.fitting.uncertainty import standard_errors
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
-from thsa_cosim.diagnosis.results import DiagnosisResult, EmpiricalLaw, StructuredError
+from thsa_cosim.diagnosis.results import DiagnosisResult, EmpiricalLaw, RivalLaw, StructuredError
 from thsa_cosim.export.compile import native_platform
 from thsa_cosim.identify import ForceBalance, force_balance
 from thsa_cosim.scenario import DiagnoseSpec, Scenario
@@ -110,6 +111,9 @@ class Conclusion:
             if searched is not None:
                 fit = extended.identified.fit if self.spec.empirical else searched.terms.final
                 law = law_of(searched.terms, fit, added=self.spec.empirical)
+        instead: tuple[RivalLaw, ...] = ()
+        if verdict == "missing-effect" and self.spec.empirical and self.box is None:
+            instead = self._instead()
         after = extended.identified
         changed = after is not before
         between = between_models(found, after.fit, self.bench.of("fit"))
@@ -166,6 +170,7 @@ class Conclusion:
             data=with_slips(scenario.data, after, scenario.file_units),
             asked=scenario.table.model_dump(mode="json", by_alias=True, exclude_unset=True),
             coupling=coupled if isinstance(coupled, CouplingError) else None,
+            instead=instead,
         )
 
     def _coupled(self, model: Identified) -> CouplingError | str:
@@ -213,10 +218,21 @@ class Conclusion:
     def _law_search(self, after: Identified) -> FoundLaw | None:
         """An empirical law in what the extended model leaves."""
         self.study.place.say("looking for an empirical law")
+        return self._search(self.found.accepted, after).find()
+
+    def _instead(self) -> tuple[RivalLaw, ...]:
+        """Empirical laws that explain the held-out recordings as well as the effects do, without them."""
+        self.study.place.say("looking for an empirical law in place of the effects")
+        searched = self._search((), self.before).find()
+        if searched is None:
+            return ()
+        return rival_laws(self.found, searched.terms, self.bench.trials)
+
+    def _search(self, accepted: tuple[Scored, ...], after: Identified) -> LawSearch:
         return LawSearch(
-            self.scenario, self.spec, self.trials, self.unknowns, self.known, self.found.accepted, after,
+            self.scenario, self.spec, self.trials, self.unknowns, self.known, accepted, after,
             self.study.folder / WORK, self.study.open_runner, self.machine, self.study.place.say,
-        ).find()  # fmt: skip
+        )  # fmt: skip
 
     def _with_law(self, law: FoundLaw) -> _Model:
         """The model with an empirical law and the effects that are still needed."""

@@ -196,6 +196,17 @@ class EmpiricalLaw:
     added: bool
 
 
+@dataclass(frozen=True)
+class RivalLaw:
+    """A law that explains the held-out recordings as well as the effects do, in place of them.
+
+    ``declared``: the declared parameters with it.
+    """
+
+    terms: tuple[EmpiricalTerm, ...]
+    declared: Mapping[str, Value]
+
+
 Errors = Mapping[str, Mapping[str, StructuredError]]
 """Part ("fit", "validate") or recording → channel → error."""
 
@@ -249,3 +260,5 @@ class DiagnosisResult:
     """Effects of the declared model; their parameters stand among the declared ones by FMU variable, too."""
     coupling: CouplingError | None = None
     """What half the communication step changes at the last fit, of an FMU that depends on one."""
+    instead: tuple[RivalLaw, ...] = ()
+    """Laws that these recordings cannot tell from the effects, where the scenario asks for an empirical law."""

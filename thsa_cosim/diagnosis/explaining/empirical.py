@@ -291,13 +291,13 @@ class LawSearch:
 def law_of(found: Attribution, fit: Fit, *, added: bool) -> EmpiricalLaw:
     """A search's accepted terms in the words of the result, with the values of ``fit``."""
     values = values_of(fit, declared=False)
-    terms = tuple(term for scored in found.accepted for term in _terms(scored, values))
+    terms = tuple(term for scored in found.accepted for term in terms_of(scored, values))
     held = found.base_validate
     gain = float(held @ held - found.final_validate @ found.final_validate)
     return EmpiricalLaw(terms, gain, added)
 
 
-def _terms(scored: Scored, values: Mapping[str, Value]) -> Iterator[EmpiricalTerm]:
+def terms_of(scored: Scored, values: Mapping[str, Value]) -> Iterator[EmpiricalTerm]:
     """What one accepted effect adds: a term for each of its coefficients, with its shapes put in."""
     candidate = scored.candidate
     texts = {p.name: p.description.removeprefix("coefficient of ") for p in candidate.variant.parameters}

@@ -10,10 +10,12 @@ from thsa_cosim.diagnosis.results import (
     Balance,
     DiagnosisResult,
     EmpiricalLaw,
+    EmpiricalTerm,
     Errors,
     Evidence,
     FoundEffect,
     Judged,
+    RivalLaw,
     SeparatingExperiment,
     StructuredError,
     Value,
@@ -56,6 +58,7 @@ def diagnosis_json(result: DiagnosisResult, folder: Path) -> dict[str, Any]:
         "balance": [_balance(b) for b in result.balances],
         "evidence": None if result.evidence is None else _evidence(result.evidence),
         "empirical": None if result.empirical is None else _law(result.empirical),
+        **({"instead": [_rival(law) for law in result.instead]} if result.instead else {}),
         "equivalence": [{"names": list(c.names), "angle_deg": c.angle_deg} for c in result.equivalence],
         "experiment": None if result.experiment is None else _experiment(result.experiment),
         "data": result.data.to_dict(),
@@ -168,20 +171,25 @@ def _experiment(best: SeparatingExperiment) -> dict[str, Any]:
 def _law(law: EmpiricalLaw) -> dict[str, Any]:
     return {
         "slot": law.terms[0].slot,
-        "terms": [
-            {
-                "slot": t.slot,
-                "term": t.term,
-                "coefficient": t.coefficient.value,
-                "unit": t.coefficient.unit,
-                "stderr": t.coefficient.stderr,
-                "shapes": _values(t.shapes),
-            }
-            for t in law.terms
-        ],
+        "terms": [_term(t) for t in law.terms],
         "held_out_gain": law.held_out_gain,
         "added": law.added,
     }
+
+
+def _term(term: EmpiricalTerm) -> dict[str, Any]:
+    return {
+        "slot": term.slot,
+        "term": term.term,
+        "coefficient": term.coefficient.value,
+        "unit": term.coefficient.unit,
+        "stderr": term.coefficient.stderr,
+        "shapes": _values(term.shapes),
+    }
+
+
+def _rival(law: RivalLaw) -> dict[str, Any]:
+    return {"terms": [_term(t) for t in law.terms], "parameters": _values(law.declared)}
 
 
 def _cells(values: Collection[Any]) -> list[str]:

@@ -82,31 +82,55 @@ def structure(part: Part) -> Section | None:
     law: Json | None = (part.result or {}).get("empirical")
     if law:
         blocks.append(_law_table(law))
+    rivals: list[Json] = (part.result or {}).get("instead", [])
+    if rivals:
+        blocks.append(_rivals_table(rivals))
     return Section(f"{part.prefix}structure", "On what the residual depends", tuple(blocks))
 
 
-def _law_table(law: Json) -> Table:
-    columns = [Column("slot", numeric=False), Column("term", numeric=False), Column("coefficient")]
-    columns += [Column("unit", numeric=False)]
+_TERM_COLUMNS = (
+    Column("slot", numeric=False),
+    Column("term", numeric=False),
+    Column("coefficient"),
+    Column("unit", numeric=False),
+)
+_VARIABLES = "v, z, N, d: speed, position, load and distance in the slot, in its units"
+
+
+def _term_cells(term: Json) -> tuple[Cell, ...]:
+    return (
+        text_cell(term["slot"]),
+        text_cell(term["term"]),
+        Cell(plus_minus(term["coefficient"], term.get("stderr")), term["coefficient"]),
+        text_cell(term.get("unit", "")),
+    )
+
+
+def _rivals_table(rivals: list[Json]) -> Table:
+    columns = (Column("law"), *_TERM_COLUMNS)
     rows = [
-        (
-            text_cell(t["slot"]),
-            text_cell(t["term"]),
-            Cell(plus_minus(t["coefficient"], t.get("stderr")), t["coefficient"]),
-            text_cell(t.get("unit", "")),
-        )
-        for t in law["terms"]
+        (Cell(str(k), k), *_term_cells(term))
+        for k, law in enumerate(rivals, start=1)
+        for term in law["terms"]
     ]
+    note = (
+        f"{_VARIABLES}. Each law explains the held-out recordings as well as the effects, in place of them."
+    )
+    return Table("Empirical laws in place of the effects ± one standard error", columns, rows, note)
+
+
+def _law_table(law: Json) -> Table:
+    rows = [_term_cells(term) for term in law["terms"]]
     fate = (
         "added to the model"
         if law.get("added")
         else "not added to the model (diagnose.empirical = true adds it)"
     )
     note = (
-        "v, z, N, d: speed, position, load and distance in the slot, in its units; held-out gain"
-        f" {number(law.get('held_out_gain'), 3)} noise variances; {fate}. The law is descriptive, not physical."
+        f"{_VARIABLES}; held-out gain {number(law.get('held_out_gain'), 3)} noise variances; {fate}. The law is"
+        " descriptive, not physical."
     )
-    return Table("Empirical law of the unexplained residual ± one standard error", columns, rows, note)
+    return Table("Empirical law of the unexplained residual ± one standard error", _TERM_COLUMNS, rows, note)
 
 
 def _shares(part: Part, balance: list[Json]) -> Figure:

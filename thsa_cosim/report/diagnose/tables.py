@@ -1,6 +1,6 @@
 """What the command line prints at the end of a diagnosis (rich), from what result.json holds."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
@@ -51,6 +51,7 @@ def print_diagnosis(console: Console, content: Content) -> None:
         *_forces(content),
         *_faults(content),
         *empirical_law(content),
+        *rival_laws(content),
         *_undetermined(content),
         *_alike(content),
         *_advice(content),
@@ -133,10 +134,7 @@ def empirical_law(content: Content) -> list[str]:
     law = content["empirical"]
     if law is None:
         return []
-    terms = " + ".join(
-        f"({number(t['coefficient'], 3)} +- {number(t['stderr'], 1)}{_unit(t['unit'])}) {t['term']} at {t['slot']}"
-        for t in law["terms"]
-    )
+    terms = _sum(law["terms"])
     fate = (
         "It was added to the model."
         if law["added"]
@@ -146,6 +144,22 @@ def empirical_law(content: Content) -> list[str]:
         f"Empirical law (descriptive, not physical): {terms}; held-out gain"
         f" {number(law['held_out_gain'], 3)} noise variances. {fate}"
     ]
+
+
+def rival_laws(content: Content) -> list[str]:
+    """The laws that explain the held-out recordings as well as the effects, in place of them."""
+    return [
+        "These recordings could not distinguish the effects from an empirical law in place of them:"
+        f" {_sum(law['terms'])}."
+        for law in content.get("instead", [])
+    ]
+
+
+def _sum(terms: Sequence[Mapping[str, Any]]) -> str:
+    return " + ".join(
+        f"({number(t['coefficient'], 3)} +- {number(t['stderr'], 1)}{_unit(t['unit'])}) {t['term']} at {t['slot']}"
+        for t in terms
+    )
 
 
 def _unit(unit: str) -> str:

@@ -348,8 +348,17 @@ def prune(
             if _carries(dropped.candidate, [s.candidate for s in kept]):
                 continue
             fewer = extended_unknowns(unknowns, kept)
-            vector = current.at(fewer.names)
-            fit = refine(bench, fewer, vector, iterations=6, enough=3.0)
+            fit = refine(
+                bench,
+                fewer,
+                current.at(fewer.names),
+                jacobian=current.jacobian_of(fewer),
+                steps=current.steps_of(fewer),
+                near=True,
+                iterations=6,
+                enough=3.0,
+                to_beat=current.cost,
+            )
             validate = None if fit is None else bench.residuals(fewer, fit.vector[None, :], "validate")[0]
             if fit is None or validate is None:
                 continue

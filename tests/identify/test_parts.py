@@ -67,6 +67,15 @@ def test_means_keep_white_noise_at_one_and_what_the_data_say_about_a_slow_signal
     assert pooled @ pooled == pytest.approx(whole @ whole, rel=1e-3)
 
 
+def test_means_of_means_are_means_of_all_their_samples() -> None:
+    time = np.arange(62) * 0.1
+    channel = Channel("a", time, time**2, noise=0.6)
+    twice, once = channel.means(2).means(3), channel.means(6)
+    assert (twice.mean_of, twice.noise) == (6, pytest.approx(once.noise))
+    for name in ("time", "measured", "fine"):
+        np.testing.assert_allclose(getattr(twice, name), getattr(once, name))
+
+
 def test_a_channel_of_too_few_samples_for_means_stays_as_it_is() -> None:
     channel = Channel("a", TIME, TIME, noise=1.0)
     assert channel.means(1) is channel

@@ -40,18 +40,20 @@ class Channel:
     def means(self, of: int) -> "Channel":
         """The same of the means of ``of`` neighbouring samples, simulated as measured; white noise is √of smaller.
 
-        What is left over at the end is dropped; a channel of fewer than two means stays as it is.
+        What is left over at the end is dropped; a channel of fewer than two means stays as it is. Of means, means of
+        these.
         """
         count = self.time.size // of
-        if of < 2 or count < 2 or self.fine is not None:
+        if of < 2 or count < 2:
             return self
-        fine, measured = (values[: count * of] for values in (self.time, self.measured))
+        time, measured = (values[: count * of] for values in (self.time, self.measured))
+        fine = self.time if self.fine is None else self.fine
         return replace(
             self,
-            time=fine.reshape(count, of).mean(axis=1),
+            time=time.reshape(count, of).mean(axis=1),
             measured=measured.reshape(count, of).mean(axis=1),
             noise=self.noise / np.sqrt(of),
-            fine=fine,
+            fine=fine[: count * of * self.mean_of],
         )
 
     def residual(self, simulated: Signals) -> FloatArray:

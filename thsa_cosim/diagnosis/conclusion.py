@@ -38,6 +38,7 @@ from thsa_cosim.diagnosis.explaining.slips import with_slips
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified, identify_model
+from thsa_cosim.diagnosis.fitting.means import by_samples, by_search
 from thsa_cosim.diagnosis.fitting.structure import errors, errors_by_recording
 from thsa_cosim.diagnosis.fitting.trials import (
     Trial,
@@ -192,7 +193,7 @@ class Conclusion:
     def _declared(self) -> Identified:
         """The declared model, identified once more if the search came to a better optimum than the drawing led to."""
         base = self.found.base
-        before = self.before.fit
+        before = by_search(self.before.fit, self.trials, self.bench.trials)
         if self.found.base_cost > before.cost - BETTER * before.inflation:
             return self.before
         self.study.place.say("identifying the declared model, starting from the result of the search")
@@ -252,7 +253,8 @@ class Conclusion:
     ) -> Identified:
         """``unknowns`` from the drawing and from where the search ended."""
         hint = final.at(unknowns.names)
-        return self._identify(fmu, unknowns, [unknowns.at_drawing(hint), hint], accepted, final)
+        near = by_samples(final, self.trials, self.bench.trials)
+        return self._identify(fmu, unknowns, [unknowns.at_drawing(hint), hint], accepted, near)
 
     def _identify(
         self,

@@ -22,6 +22,7 @@ from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.drawing import declared_unknowns
 from thsa_cosim.diagnosis.fitting.following import Following
 from thsa_cosim.diagnosis.fitting.identified import identify_model
+from thsa_cosim.diagnosis.fitting.means import by_search
 from thsa_cosim.diagnosis.fitting.trials import (
     Trial,
     for_search,
@@ -120,7 +121,7 @@ def _diagnose(
                 unknowns,
                 tested.candidates,
                 scan,
-                start=before.fit,
+                start=by_search(before.fit, declared, driven),
                 seed=scenario.seed,
                 most=spec.most,
                 machine=machine,

@@ -91,7 +91,8 @@ class DiagnoseOptionsTable(Table):
     load: Name | None = None
     """The input that loads the drive; a separating experiment may vary it."""
     empirical: bool = False
-    """Add an empirical law to the model if a repeatable residual is left that no effect explains."""
+    """Add an empirical law to the model if a repeatable residual is left that no effect explains; else name the laws
+    that explain as much as the effects."""
     limits: LimitsTable = LimitsTable()
     balances: list[BalanceTable] = Field(default_factory=list)
     blackbox: BlackBoxTable | None = None

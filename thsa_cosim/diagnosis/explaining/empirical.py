@@ -34,6 +34,7 @@ from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.identified import Identified
+from thsa_cosim.diagnosis.fitting.means import by_search
 from thsa_cosim.diagnosis.fitting.trials import Trial, for_search
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
@@ -247,7 +248,7 @@ class LawSearch:
                 unknowns,
                 candidates,
                 scan,
-                start=self.after.fit,
+                start=by_search(self.after.fit, self.trials, trials),
                 seed=self.scenario.seed,
                 most=_TERMS if self.spec.empirical else 1,
                 machine=self.machine,

@@ -148,8 +148,9 @@ def driven(trial: Trial, followed: Followed) -> Trial:
     case = trial.case
     channel = next(c for c in case.channels if c.name == followed.channel)
     time, speed = channel.time, channel.measured
-    count = time.size // MEANS
+    of = max(1, MEANS // channel.mean_of)
+    count = time.size // of
     if count > 1:
-        time, speed = (x[: count * MEANS].reshape(count, MEANS).mean(axis=1) for x in (time, speed))
+        time, speed = (x[: count * of].reshape(count, of).mean(axis=1) for x in (time, speed))
     values = {**case.inputs.values, followed.slot.measured: np.interp(case.inputs.time, time, speed)}
     return replace(trial, case=replace(case, inputs=replace(case.inputs, values=values)))

@@ -19,6 +19,8 @@ Part = Literal["fit", "validate"]
 #: Fit recordings of more residuals than this are compared by means of neighbouring samples: a diagnosis holds some
 #: hundred vectors of that length. A minute of five signals at 1 kHz.
 ROWS = 300_000
+#: A search compares so many residuals, by means of more neighbours: what is found is identified and judged by all.
+SEARCHED_ROWS = 100_000
 #: Relative tolerance of a search's runs, where the scenario asks for a smaller one; what is found is identified and
 #: judged at its own. With a ripple of 24 periods a turn it errs by 0.001 standard deviations of the noise (rms).
 SEARCHED = 1e-4
@@ -127,11 +129,12 @@ def with_fmu(
 
 
 def for_search(trials: tuple[Trial, ...], fmu: Path) -> tuple[Trial, ...]:
-    """The same recordings driving a model of all effects, which is ours, at the tolerance of a search."""
-    return tuple(
+    """The same recordings driving a model of all effects, which is ours, at a search's tolerance, by its means."""
+    driven = (
         replace(t, case=replace(t.case, tolerance=max(SEARCHED, t.case.tolerance or 0.0)))
         for t in with_fmu(trials, fmu)
     )
+    return by_means(tuple(driven), SEARCHED_ROWS)
 
 
 def with_wrapper(

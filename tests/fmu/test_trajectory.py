@@ -126,3 +126,15 @@ def test_other_fmus_are_stepped_through_their_samples(fmu: object) -> None:
             assert not is_offered(plant._instance)
             assert not plant._instance.library.exports(FUNCTION)
     np.testing.assert_array_equal(*results)
+
+
+def test_a_run_ends_that_takes_more_steps_than_it_may(pair: tuple[Plant, Plant]) -> None:
+    free, _ = pair
+    inputs = command(held=False)
+    whole = free.run({}, inputs, OUTPUTS, TIME)
+    enough = free.run({}, inputs, OUTPUTS, TIME, most_steps=2000)
+    assert all(np.array_equal(enough[n], whole[n]) for n in OUTPUTS)
+    with pytest.raises(SimulationFailure, match="more internal steps than the run may take"):
+        free.run({}, inputs, OUTPUTS, TIME, most_steps=40)
+    again = free.run({}, inputs, OUTPUTS, TIME)
+    assert all(np.array_equal(again[n], whole[n]) for n in OUTPUTS), "the limit was that of one run"

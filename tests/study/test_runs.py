@@ -242,12 +242,13 @@ def changed_experiments(experiment: Experiment) -> dict[str, Experiment]:
         "time": replace(experiment, time=TIME[:-1]),
         "fixed": replace(experiment, fixed={"tau": 0.2}),
         "tolerance": replace(experiment, tolerance=1e-5),
+        "steps": replace(experiment, most_steps=100_000),
         "reduce": replace(experiment, reduce=len),  # type: ignore[arg-type]
     }
 
 
 @pytest.mark.parametrize(
-    "what", ["fmu", "inputs", "no inputs", "outputs", "time", "fixed", "tolerance", "reduce"]
+    "what", ["fmu", "inputs", "no inputs", "outputs", "time", "fixed", "tolerance", "steps", "reduce"]
 )
 def test_another_run_is_not_looked_up(tmp_path: Path, experiment: Experiment, what: str) -> None:
     job, other = Job("fit/a", {"seed": 1.0}), changed_experiments(experiment)[what]

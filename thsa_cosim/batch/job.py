@@ -68,6 +68,9 @@ class Experiment:
     """Start values that hold in every job, in the FMU's units; a job's values win over them."""
     tolerance: float | None = None
     """Relative solver tolerance; None: the FMU's default."""
+    most_steps: int | None = None
+    """Attempts at a step that the solver of an FMU of ours may take; None: as many as it wants. A wrapper's are not
+    counted."""
     reduce: Reducer | None = None
     """Applied in the worker, so that signals need not travel; see ``Outcome.reduced``."""
     input_mode: str | None = None

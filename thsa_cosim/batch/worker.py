@@ -273,7 +273,7 @@ def _simulate(experiment: Experiment, plant: Plant, values: Mapping[str, float])
     drive = (experiment.inputs, experiment.outputs, experiment.time)
     if experiment.wrapper is not None:
         return experiment.wrapper.run(plant.run, values, *drive, experiment.tolerance)
-    return plant.run(values, *drive, tolerance=experiment.tolerance)
+    return plant.run(values, *drive, tolerance=experiment.tolerance, most_steps=experiment.most_steps)
 
 
 def _sentence(error: Exception) -> str:

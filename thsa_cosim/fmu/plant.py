@@ -153,6 +153,7 @@ class Plant(Closing):
         *,
         tolerance: float | None = None,
         once: bool = False,
+        most_steps: int | None = None,
     ) -> Signals:
         """Simulate once.
 
@@ -173,6 +174,8 @@ class Plant(Closing):
             Relative tolerance for the FMU's solver (or, in Model Exchange, ours); ``None``: its default.
         once
             These inputs will not come again: nothing prepared for them is kept.
+        most_steps
+            Attempts at a step that the solver of an FMU of ours may take in a run of one call; else it has failed.
 
         Returns
         -------
@@ -195,7 +198,7 @@ class Plant(Closing):
             return run_fmi1(self.folder, self.description, given, inputs, outputs, time, self.progress, mode)
         points = self._points(time)
         try:
-            result = self._run(values, inputs, outputs, points, tolerance, once)
+            result = self._run(values, inputs, outputs, points, tolerance, once, most_steps)
         except BaseException:
             self._free()
             raise
@@ -233,6 +236,7 @@ class Plant(Closing):
         time: FloatArray,
         tolerance: float | None,
         once: bool,
+        most_steps: int | None,
     ) -> Signals:
         instance = self._instance
         if instance is None:
@@ -271,7 +275,7 @@ class Plant(Closing):
         instance.set_values(plan.input_channels, plan.first)
         instance.initialize_end()
         if free and tolerance is not None:
-            signals = follow(instance, plan, self.progress, tolerance)
+            signals = follow(instance, plan, self.progress, tolerance, most_steps)
         elif isinstance(instance, Fmi3Instance) and instance.event_mode:
             signals = step_with_events(instance, plan, self.progress)
         else:

@@ -93,16 +93,19 @@ def _course(plan: Plan, tolerance: float) -> Course:
     return course
 
 
-def follow(instance: Instance, plan: Plan, progress: FloatArray, tolerance: float) -> Signals:
+def follow(
+    instance: Instance, plan: Plan, progress: FloatArray, tolerance: float, most_steps: int | None = None
+) -> Signals:
     """Run an initialised instance through ``plan``; SimulationFailure if it does not reach the end.
 
     ``tolerance``: what ``solver_tolerance`` gave. Inputs keep within it, and within ``segments.MERGED``, of their
-    samples.
+    samples. ``most_steps``: attempts at a step that the run may take; older FMUs know no such limit.
     """
     course = _course(plan, tolerance)
     struct, n = course.struct, len(plan.grid.times)
     results = np.empty((len(plan.outputs), n))
     struct.results, struct.progress = results.ctypes.data, progress[1:].ctypes.data
+    struct.steps = most_steps or 0
     progress[0] = Phase.STEP
     function = instance.library.function(FUNCTION, ctypes.c_void_p, ctypes.c_void_p)
     code = function(instance.handle, ctypes.addressof(struct))

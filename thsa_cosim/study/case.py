@@ -23,7 +23,7 @@ class Case:
 
     ``channels`` are fitted, within the cost's window; ``measured`` holds all samples after the lead-in.
     ``fixed``: start values that every run has, in the FMU's units. ``input_noise``: 1 σ of the white noise that was
-    smoothed away, of inputs that are piecewise linear.
+    smoothed away, of inputs that are piecewise linear. ``most_steps``: as in `Experiment`.
     """
 
     name: str
@@ -38,6 +38,7 @@ class Case:
     wrapper: Wrapper | None = None
     texts: Mapping[str, str] = field(default_factory=dict)
     input_noise: Mapping[str, float] = field(default_factory=dict)
+    most_steps: int | None = None
 
     def experiment(self, name: str, reduce: Reducer | None) -> Experiment:
         """The simulation under ``name`` with what the worker makes of its signals."""
@@ -49,6 +50,7 @@ class Case:
             time=self.time,
             fixed=self.fixed,
             tolerance=self.tolerance,
+            most_steps=self.most_steps,
             reduce=reduce,
             texts=self.texts,
             wrapper=self.wrapper,

@@ -208,7 +208,8 @@ def _experiment_key(experiment: Experiment, settings: Any, archives: dict[Path, 
             archives[experiment.fmu] = ""  # its runs fail, and say why
     # Equal objects may pickle differently, which costs a run; different ones never pickle alike.
     what = (experiment.inputs, experiment.outputs, experiment.time, dict(experiment.fixed))
-    how = (experiment.tolerance, experiment.reduce, experiment.wrapper, settings, dict(experiment.texts))
+    limits = (experiment.tolerance, experiment.most_steps)
+    how = (*limits, experiment.reduce, experiment.wrapper, settings, dict(experiment.texts))
     data = pickle.dumps((archives[experiment.fmu], what, how), pickle.HIGHEST_PROTOCOL)
     return hashlib.sha256(data).digest()
 

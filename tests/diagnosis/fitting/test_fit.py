@@ -14,7 +14,14 @@ from thsa_cosim.batch.runner import OnOutcome
 from thsa_cosim.costs.channels import Channel
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
-from thsa_cosim.diagnosis.fitting.trials import SEARCHED, Trial, by_means, for_search, note_on_means
+from thsa_cosim.diagnosis.fitting.trials import (
+    LEAST_STEPS,
+    SEARCHED,
+    Trial,
+    by_means,
+    for_search,
+    note_on_means,
+)
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import Signals
@@ -367,6 +374,8 @@ def test_the_runs_of_a_search_are_no_more_accurate_than_a_search_needs():
     assert [t.case.tolerance for t in found] == [SEARCHED, 1e-3]
     assert {t.experiment.fmu for t in found} == {Path("all.fmu")}
     assert [t.experiment.tolerance for t in for_search(own, Path("y.fmu"))] == [SEARCHED, SEARCHED]
+    assert [t.experiment.most_steps for t in found] == [LEAST_STEPS, LEAST_STEPS]
+    assert [t.experiment.most_steps for t in own] == [None, None]
 
 
 def test_a_fit_that_what_is_reached_elsewhere_is_too_far_from_is_given_up():

@@ -87,3 +87,13 @@ def test_the_error_of_a_factor_of_the_input_is_that_of_the_inputs_level():
     (found,) = errors_of_inputs(fit, residuals)
     assert found == pytest.approx(p * NOISE / np.sqrt(TIME.size) / level, rel=0.15)
     assert errors_of_inputs(fit, []) == np.zeros(1)
+
+
+def test_few_draws_state_an_error_whose_double_holds_in_95_percent():
+    unknowns = Unknowns((Unknown("p", "p", "1", 0.3, np.inf, scale=0.1, lower=0.0, upper=1.0),))
+    fit = Fit(unknowns, np.array([0.3]), np.zeros(4), np.full((4, 1), 0.5), np.ones(1), 0.0, True)
+    random, inside = np.random.default_rng(4), []
+    for sizes in random.standard_normal((2000, 9)):
+        (stated,) = errors_of_inputs(fit, [np.full(4, 0.5 * size) for size in sizes[:8]])
+        inside.append(abs(0.1 * sizes[8]) < 1.96 * stated)
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.015)

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from thsa_cosim.diagnosis.fitting.bench import AT_ONCE
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -61,11 +63,13 @@ def draws_of(trials: Sequence[Trial]) -> list[tuple[Trial, ...]]:
 def errors_of_inputs(fit: Fit, residuals: Sequence[FloatArray]) -> FloatArray:
     """(n,) standard errors in the unknowns' units, from the residuals (N,) of every draw at the fitted vector.
 
-    Each draw moves the optimum by a Gauss-Newton step; 0 for what nothing determines.
+    Each draw moves the optimum by a Gauss-Newton step; 0 for what nothing determines. What few draws do not know of
+    their own spread counts: two such errors are the 95 % of Student's law.
     """
     inverse = fit.covariance()
     inverse = np.where(np.isfinite(inverse), inverse, 0.0)
     moves = [inverse @ (fit.jacobian.T @ (residual - fit.residual)) for residual in residuals]
     if not moves:
         return np.zeros(fit.vector.size)
-    return np.asarray(np.sqrt(np.mean(np.square(moves), axis=0)) * fit.unknowns.scale)
+    few = float(student.ppf(0.975, len(moves)) / norm.ppf(0.975))
+    return np.asarray(few * np.sqrt(np.mean(np.square(moves), axis=0)) * fit.unknowns.scale)

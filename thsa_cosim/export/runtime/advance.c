@@ -236,6 +236,7 @@ Status solver_advance(Instance *c, double end) {
         }
         for (;;) { /* attempts at one step */
             if (++attempts > MOST_STEPS) return explain_slowness(c, "too many internal steps in one communication step");
+            if (c->recorder && trajectory_is_spent(c)) return explain_slowness(c, "more internal steps than the run may take");
             if (c->before_step && !landing) {
                 c->before_step(c, now->time + h);
                 from = now->time;

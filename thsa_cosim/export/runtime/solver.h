@@ -14,6 +14,7 @@ double solver_tolerance(const Instance *c);    /* tolerance that the step contro
 
 Status trajectory_record(Instance *c, double h, double until, int inclusive); /* rows within the step just done */
 double trajectory_spacing(const Instance *c);  /* mean distance of rows */
+int trajectory_is_spent(Instance *c);          /* counts an attempt at a step; whether the run may take no more */
 
 Status solver_advance(Instance *c, double end);  /* integrate to `end`; logs its reason when it fails */
 

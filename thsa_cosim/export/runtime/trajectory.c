@@ -15,6 +15,7 @@
 struct Recorder {
     Trajectory *run;
     const double **source;   /* (n_outputs) into the point below or the instance's parameters */
+    size_t most, attempts;   /* at steps; most is 0 without a limit */
     int outputs, algebraic, derivatives, indicators; /* which functions the rows need */
     double from;             /* start of the present segment */
     double u_from[N_U + 1];  /* inputs there */
@@ -115,6 +116,11 @@ double trajectory_spacing(const Instance *c) {
     return (run->times[run->n_times - 1] - run->times[0]) / (double)(run->n_times - 1);
 }
 
+int trajectory_is_spent(Instance *c) {
+    Recorder *r = c->recorder;
+    return ++r->attempts > r->most && r->most;
+}
+
 static Status cross(Instance *c, double end) { return discrete_advance(c, end); }
 
 #else
@@ -209,6 +215,7 @@ Status trajectory_run(Instance *c, Trajectory *run) {
         return FAILED;
     }
     r->run = run;
+    r->most = run->steps;
     run->done = 0;
     run->reached = c->s.now.time;
     if ((status = check(c, r)) == OK) {

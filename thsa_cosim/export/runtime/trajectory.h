@@ -25,7 +25,8 @@ typedef struct {
     double *results;         /* (n_outputs, n_times): what belongs to one variable is contiguous */
     double *progress;        /* time reached, written while running; or NULL */
     size_t done;             /* rows that are filled */
-    size_t steps, rejected, events; /* of this run */
+    size_t steps;            /* in: at most so many attempts at a step, 0 for no limit; out: steps of this run */
+    size_t rejected, events; /* of this run */
     double reached;          /* time reached */
 } Trajectory;
 

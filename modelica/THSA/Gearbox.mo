@@ -15,7 +15,7 @@ model Gearbox "Reduction gear with its losses at the output shaft"
     alpha1(unit="N.m.s/rad", min=-100, max=100), alpha2(unit="N.m.s/rad", min=-100, max=100))
     "Viscous friction coefficient";
   THSA.Friction friction(v(unit="rad/s"), F_C(unit="N.m"), b_v(unit="N.m.s/rad"), F_f(unit="N.m"),
-    b_q(unit="N.m.s2/rad2", min=-1000, max=1000), v_S(unit="rad/s", max=1000) = 1, v_r(unit="rad/s", max=1) = 1e-4)
+    b_q(unit="N.m.s2/rad2", min=-1000, max=1000), v_S(unit="rad/s", max=1000) = 1, v_r(unit="rad/s", max=1) = 1e-5)
     "Friction of the gear train";
   THSA.Units.AngularVelocity w_g "Speed of the output shaft";
   THSA.Units.Power P_f "Friction loss";

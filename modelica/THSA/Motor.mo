@@ -32,7 +32,7 @@ model Motor "Permanent-magnet synchronous motor in the power-invariant dq frame,
     a2(unit="N.m.s/(rad.K2)", min=-0.01, max=0.01) = 1e-8, a3(unit="N.m.s/(rad.K3)", min=-0.001, max=0.001) = 1e-10,
     alpha1(unit="N.m.s/rad", min=-1, max=1), alpha2(unit="N.m.s/rad", min=-1, max=1)) "Viscous friction coefficient";
   THSA.Friction friction(v(unit="rad/s"), F_C(unit="N.m"), b_v(unit="N.m.s/rad"), F_f(unit="N.m"),
-    b_q(unit="N.m.s2/rad2", min=-1, max=1), v_S(unit="rad/s", max=1000) = 10, v_r(unit="rad/s", max=10) = 3e-3)
+    b_q(unit="N.m.s2/rad2", min=-1, max=1), v_S(unit="rad/s", max=1000) = 10, v_r(unit="rad/s", max=10) = 3e-4)
     "Friction of the bearings";
   THSA.Units.Angle phi(start=0, fixed=true, nominal=10) "Angle of the rotor";
   THSA.Units.TorqueConstant K_t "Torque constant";

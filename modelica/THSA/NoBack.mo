@@ -3,7 +3,7 @@ model NoBack "No-back device: free while the load opposes, a drag larger than th
   THSA.Interfaces.RotationalFlange flange_a "Shaft on the gearbox's side";
   THSA.Interfaces.RotationalFlange flange_b "Shaft on the screw's side";
   parameter THSA.Units.Ratio k_b(min=0, max=10) = 1.15 "Drag per torque of the aiding load";
-  parameter THSA.Units.AngularVelocity w_r(min=1e-12, max=1) = 1e-4 "Half width of the regularised sign";
+  parameter THSA.Units.AngularVelocity w_r(min=1e-12, max=1) = 1e-5 "Half width of the regularised sign";
   THSA.Units.AngularVelocity w "Speed of the shaft";
   THSA.Units.Torque tau_s "Torque at the screw, positive opposes positive speed";
   THSA.Units.Torque tau_nb "Drag of the no-back device";

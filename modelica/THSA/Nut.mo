@@ -13,7 +13,7 @@ model Nut "Nut: friction of the screw against the housing"
     a2(unit="N.s/(m.K2)", min=-1e6, max=1e6) = 230, a3(unit="N.s/(m.K3)", min=-1e5, max=1e5),
     alpha1(unit="N.s/m", min=-1e8, max=1e8), alpha2(unit="N.s/m", min=-1e8, max=1e8)) "Viscous friction coefficient";
   THSA.Friction friction(v(unit="m/s"), F_C(unit="N"), b_v(unit="N.s/m"), F_f(unit="N"),
-    b_q(unit="N.s2/m2", min=-1e9, max=1e9), v_S(unit="m/s", max=1) = 1e-3, v_r(unit="m/s", max=1e-3) = 1e-7)
+    b_q(unit="N.s2/m2", min=-1e9, max=1e9), v_S(unit="m/s", max=1) = 1e-3, v_r(unit="m/s", max=1e-3) = 1e-8)
     "Friction of screw and nut";
   THSA.Units.Velocity v "Speed of the nut";
   THSA.Units.Power P_f "Friction loss";

@@ -24,7 +24,9 @@ exponentials, all coefficients parameters. To work at one temperature set every 
 <code>Actuator</code>, set them to &minus;300.</p>
 <h4>Friction</h4>
 <p>The sign of the sliding speed is a straight line through zero, <code>v_r</code> wide on each side. The width is
-a parameter: a held load creeps at most at <code>v_r</code>. Crossing the border is a state event.</p>
+a parameter: a held load creeps at most at <code>v_r</code>. Crossing the border is a state event. The actuator's widths
+(1e-8 m/s at the nut, 1e-5 rad/s at the gear, 3e-4 rad/s at the motor) are chosen so that a minute's recording cannot tell them
+from true stick: at ten times these, breakaway moves fitted inertia, stiffness and friction by about a standard error.</p>
 <h4>Connecting to the Modelica Standard Library</h4>
 <p><code>Interfaces.RotationalFlange</code> and <code>Interfaces.TranslationalFlange</code> have the variables of
 <code>Modelica.Mechanics.Rotational.Interfaces.Flange_a</code> and

@@ -9,6 +9,7 @@ import pytest
 from reference.radau import MOTOR_OUTPUTS, OUTPUTS, simulate, simulate_motor
 from reference.rig import LAWS, Widths, rig_at
 from reference.schedules import DRIVEN_A, DRIVEN_A_END, DRIVEN_A_LOAD, RAMP, RAMP_LOAD, samples
+from reference.stick import simulate_stick
 from reference.waves import Wave, constant
 
 from thsa_cosim.fmu import Plant
@@ -123,6 +124,13 @@ def test_ramp_of_table_iv(actuator: Plant) -> None:
     time = samples(1.2005)
     found = actuator.run({}, inputs(time, -30.0, v_cmd=RAMP, F_load=RAMP_LOAD), OUTPUTS, time)
     assert largest_error(found, expected_ramp(widths_of(actuator))) < 1e-7
+
+
+def test_widths_are_too_narrow_to_be_seen(actuator: Plant) -> None:
+    """Against the rig with true stick, relative to the range: the noise of the position is 1e-4 of it."""
+    time = samples(1.2)
+    found = actuator.run({}, inputs(time, -30.0, v_cmd=RAMP, F_load=RAMP_LOAD), OUTPUTS, time)
+    assert largest_error(found, simulate_stick(rig_at(-30.0), RAMP, RAMP_LOAD, time, rtol=1e-10)) < 6e-6
 
 
 @pytest.mark.parametrize("temperature", [25.0, -55.0])

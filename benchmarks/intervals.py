@@ -22,14 +22,13 @@ REPO = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(REPO / "tests"))
 
 from reference.radau import simulate_motor
-from reference.rig import LAWS, Widths, rig_at
+from reference.rig import LAWS, NARROW, rig_at
 from reference.waves import Wave
 
 from thsa_cosim.identify import identify
 from thsa_cosim.scenario import Executor, load
 from thsa_cosim.study import Place
 
-WIDTHS = Widths(motor=3e-3, gearbox=1e-4, nut=1e-7)
 FOUND = {"motor": ("R_s", "psi_pm", "T_fm", "b_m"), "screw": ("F_fn", "b_n"), "gearbox": ("T_fg", "b_g")}
 SPEEDS = np.array([0.5, 1.0, 2.0, 3.0, 4.5, 6.0, 7.5, 9.0]) * 1e-3
 LEVELS = (0, 20, 60, 120, 180, 120, 60, 20, -20, -60, -120, -180, -60, 0)
@@ -44,7 +43,7 @@ def motor_truth(temperature: float) -> dict[str, np.ndarray]:
         values += [values[-1], float(level)] if k else []
     time = np.arange(round(0.7 * len(LEVELS) / 1e-3)) * 1e-3
     command = np.round(np.interp(time, times, values), 2)
-    found = simulate_motor(rig_at(temperature), Wave(time, command, hold=True), time, WIDTHS, rtol=1e-7)
+    found = simulate_motor(rig_at(temperature), Wave(time, command, hold=True), time, NARROW, rtol=1e-7)
     return {
         "time_s": time,
         "speed_command_rad_s": command,

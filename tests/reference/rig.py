@@ -83,6 +83,10 @@ class Widths:
     hold_voltage: float = 0.19  # V
 
 
+#: Those of the package's actuator.
+NARROW = Widths(motor=3e-4, gearbox=1e-5, nut=1e-8)
+
+
 def rig_at(temperature: float, **changed: float) -> Rig:
     """The declared rig at a temperature in degC, with some values changed."""
     return Rig(**{**{name: law(temperature) for name, law in LAWS.items()}, **changed})

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reference.radau import OUTPUTS, simulate
-from reference.rig import LAWS, Rig, Widths
+from reference.rig import LAWS, NARROW, Rig
 from reference.schedules import RAMP, RAMP_LOAD, samples
 from scipy.integrate import solve_ivp
 
@@ -13,7 +13,6 @@ from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import Signals
 
 FMUS = Path(__file__).parents[2] / "fmus"
-WIDTHS = Widths(motor=3e-3, gearbox=1e-4, nut=1e-7)
 PARTS = ("winding", "motor", "gearbox", "screw")
 TIME = samples(1.2005)
 
@@ -48,7 +47,7 @@ def test_each_part_follows_its_own_temperature() -> None:
     rig = Rig(**{name: LAWS[name](t) for name, t in at.items()})
     load = {"v_cmd": RAMP.at(TIME), "F_load": RAMP_LOAD.at(TIME)}
     found = run("THSA", TIME, OUTPUTS, **load, T_amb=25.0, T_motor=0.0, T_gearbox=-20.0, T_screw=-40.0)
-    expected = simulate(rig, RAMP, RAMP_LOAD, TIME, WIDTHS)
+    expected = simulate(rig, RAMP, RAMP_LOAD, TIME, NARROW)
     for name in OUTPUTS:
         assert np.abs(found[name] - expected[name]).max() < 1e-6 * np.ptp(expected[name]), name
 

@@ -7,6 +7,7 @@ import pytest
 from reference.radau import MOTOR_OUTPUTS, OUTPUTS, simulate, simulate_motor, simulate_states
 from reference.rig import (
     LAWS,
+    NARROW,
     Rig,
     Widths,
     actuator_jacobian,
@@ -32,7 +33,6 @@ from reference.schedules import (
 from reference.stick import simulate_stick
 from reference.waves import Wave, constant, wave
 
-NARROW = Widths(motor=3e-3, gearbox=1e-4, nut=1e-7)
 RECORDINGS = Path(__file__).parents[3] / "shared" / "recordings"
 NOISE = {"v": 2e-5, "x": 1e-6, "w_m": 0.2, "i_q": 0.05, "u_q": 0.3}
 QUANTUM = {"v": 5e-6, "x": 1e-6, "w_m": 0.05, "i_q": 0.01, "u_q": 0.1}
@@ -206,7 +206,7 @@ def test_regularised_signs_converge_to_true_stick() -> None:
     stick = simulate_stick(rig, RAMP, RAMP_LOAD, time, rtol=1e-10)
     errors = []
     for factor in (10.0, 1.0):
-        widths = Widths(motor=3e-3 * factor, gearbox=1e-4 * factor, nut=1e-7 * factor)
+        widths = Widths(NARROW.motor * factor, NARROW.gearbox * factor, NARROW.nut * factor)
         found = simulate(rig, RAMP, RAMP_LOAD, time, widths)
         errors.append(np.array([np.abs(found[n] - stick[n]).max() / np.ptp(stick[n]) for n in OUTPUTS]))
     assert errors[1].max() < 6e-5

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reference import warm_up
 from reference.radau import simulate_motor
-from reference.rig import LAWS, Widths, rig_at
+from reference.rig import LAWS, NARROW, rig_at
 from reference.waves import Wave
 
 import thsa_cosim as tc
@@ -15,7 +15,6 @@ from thsa_cosim.laws import published_law
 from thsa_cosim.scenario import load
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
-WIDTHS = Widths(motor=3e-3, gearbox=1e-4, nut=1e-7)
 TEMPERATURES = np.linspace(-55.0, 22.0, 78)
 
 
@@ -47,8 +46,8 @@ def test_the_motor_of_the_recording_is_that_of_the_rig() -> None:
     """The generator's integration with fixed steps against Radau, at one temperature."""
     time = np.arange(301) * 0.02
     command = warm_up.plateaus(warm_up.SPEEDS, time, 1)
-    found = warm_up.motor(command, np.full(time.shape, -30.0), WIDTHS)
-    expected = simulate_motor(rig_at(-30.0), Wave(time, command, hold=True), time, WIDTHS, rtol=1e-8)
+    found = warm_up.motor(command, np.full(time.shape, -30.0), NARROW)
+    expected = simulate_motor(rig_at(-30.0), Wave(time, command, hold=True), time, NARROW, rtol=1e-8)
     for name, values in expected.items():
         assert np.abs(found[name] - values).max() < 1e-5 * np.ptp(values), name
 

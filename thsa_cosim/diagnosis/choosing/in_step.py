@@ -30,6 +30,9 @@ from thsa_cosim.signals import FloatArray
 #: The model is kept in step where an order makes up this share of the force's power. Of 23 simulated units, 9 of them
 #: with cogging, it was 0.2 to 0.75 with, and less than 0.1 without: set while looking at them.
 SHARE = 0.18
+#: The free run finds a ripple by itself if this share is left: 0.03 where it did, 0.10 to 0.71 where it ended beside
+#: the optimum. Set while looking at eight simulated units with cogging.
+FREE = 0.06
 #: What is followed, by means of samples, leaves a structure of its own: in step, less than the noise is not looked at.
 SETTLED = 1.0
 #: What is said where the model was kept in step.
@@ -80,7 +83,7 @@ class InStep:
             return None
         stepped = self.following.at(gain)
         order, share = order_in_step(stepped, followed, gain, base)
-        if share < SHARE:
+        if share < SHARE or self._is_free(stepped, followed, gain, order, base, held):
             return None
         self.say(f"keeping the model in step with {followed.channel}, which lacks {order:g} waves per turn")
         stepped.weights = {}
@@ -111,6 +114,16 @@ class InStep:
                 return Begun(whole.rounds, accepted, fit, own, goes_on=False, notes=(NOTE,))
         weights.take(before)
         return None
+
+    def _is_free(
+        self, stepped: Bench, followed: Followed, gain: float, order: float, base: Fit, held: FloatArray
+    ) -> bool:
+        """Whether the free run finds the ripple by itself: with what it finds, the force shows the order no more."""
+        made = self._added(self.bench, followed, order, base, held)
+        if made is None or made.accepted is None:
+            return False
+        left = order_in_step(stepped, followed, gain, made.accepted.fit)
+        return left[1] < FREE
 
     def _needed(self, accepted: tuple[Scored, ...], fit: Fit) -> tuple[tuple[Scored, ...], Fit]:
         """``accepted`` less further parts of an effect that the free run does not tell from nothing, and its fit."""
@@ -181,7 +194,7 @@ class InStep:
         if not proposals:
             return None
         best = proposals[0]
-        self.say(f"fitting {best.label} in step")
+        self.say(f"fitting {best.label} {'to the free run' if stepped is self.bench else 'in step'}")
         if harmonic:
             one = judge(stepped, best, _beside(fit, best), fit, held)
         else:

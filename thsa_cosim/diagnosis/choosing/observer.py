@@ -18,8 +18,9 @@ from thsa_cosim.signals import FloatArray
 ORDERS = np.arange(1.0, 145.0)
 #: The force is taken about its mean over so many samples.
 WINDOW = 101
-#: Only samples count where the shaft turns at this share of its largest speed, and so many of them.
-MOVING, FEWEST = 0.01, 500
+#: Only samples count where the shaft turns slowly, between these shares of its largest speed, and so many of them: a
+#: torque that makes it stick is as large there as at speed, an error of the speed's sensor is not.
+MOVING, SLOW, FEWEST = 0.01, 0.25, 500
 
 
 def order_in_step(bench: Bench, followed: Followed, gain: float, fit: Fit) -> tuple[float, float]:
@@ -54,7 +55,8 @@ def order_shares(
         angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
         rest = force - np.convolve(force, np.ones(WINDOW) / WINDOW, "same")
         turn = np.abs(np.gradient(angle)) * MEANS
-        moves = np.convolve(np.abs(speed), np.ones(WINDOW) / WINDOW, "same") > MOVING * largest
+        mean = np.convolve(np.abs(speed), np.ones(WINDOW) / WINDOW, "same")
+        moves = (mean > MOVING * largest) & (mean < SLOW * largest)
         for k, order in enumerate(ORDERS):
             own = moves & (order * turn < 0.5 * np.pi)
             part = rest[own]

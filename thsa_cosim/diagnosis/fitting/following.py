@@ -27,7 +27,7 @@ from thsa_cosim.signals import FloatArray, Signals
 #: A place moves as a signal shows it if the two differ by less than this share of the signal's largest value.
 SAME = 1e-6
 #: So many neighbouring samples of a measured speed are one that is followed: a solver stops at each.
-MEANS = 5
+MEANS = 10
 #: Gains are tried in these steps of the place's rms load over its largest speed, ...
 STEPS = tuple(float(g) for g in 10.0 ** np.arange(0.0, 4.5, 0.5))
 #: ... of which the least counts that leaves no more than this many times what the largest leaves in the signal.

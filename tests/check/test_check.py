@@ -175,6 +175,16 @@ def test_a_balance_that_is_zero_but_for_the_solvers_errors_is_not_compared() -> 
     assert numerics.shrinking(first, first) == set()
 
 
+def test_a_part_that_sticks_is_less_than_the_tolerance_of_one_that_moves() -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    units = {"w_A": "rad/s", "w_B": "rad/s", "x": "m"}
+    signals = Signals(
+        time, {"w_A": 300.0 * time, "w_B": 4e-5 * time, "x": 4e-5 * time, "no unit": 1e-9 * time}, units
+    )
+    assert numerics.below(signals, 1e-6) == {"w_B"}
+    assert numerics.below(signals, 1e-7) == set()
+
+
 def test_a_parameter_is_idle_only_if_none_of_the_values_of_a_search_shows() -> None:
     """The fault at 2 s comes after the end; one at 0.5 s does not."""
     given = {"duration": 1.0, "parameters": ("kick",), "values": {"dv": 1.0}}

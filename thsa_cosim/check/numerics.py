@@ -150,6 +150,17 @@ def shrinking(loose: Signals, tight: Signals) -> set[str]:
     return {n for n in loose.names if np.max(np.abs(tight[n])) <= _SHRINKS * np.max(np.abs(loose[n])) != 0.0}
 
 
+def below(signals: Signals, tolerance: float) -> set[str]:
+    """Signals smaller than what the ``tolerance`` lets the largest of their unit err by: a stuck part's creep."""
+    largest: dict[str, float] = {}
+    size = {n: float(np.max(np.abs(signals[n]))) for n in signals.names}
+    for name in signals.names:
+        unit = signals.units.get(name, "")
+        largest[unit] = max(largest.get(unit, 0.0), size[name])
+    known = [n for n in signals.names if signals.units.get(n)]
+    return {n for n in known if 0.0 < size[n] < tolerance * largest[signals.units[n]]}
+
+
 def judge_exchange(first: Signals, outcome: Outcome, zeros: Sequence[str] = ()) -> Judged:
     """Whether both interfaces say the same; ``zeros`` are zero but for the solvers' errors, and are not compared."""
     if not outcome.ok or outcome.signals is None:

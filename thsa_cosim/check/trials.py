@@ -291,7 +291,10 @@ class Trials(StepTrials):
         self._take(name, judged)
 
     def _zero_but_for_errors(self, exchange: Signals) -> tuple[str, ...]:
-        """Outputs that shrink with the solver's tolerance, in both interfaces: balances, which ought to be zero."""
+        """Outputs that shrink with the solver's tolerance, in both interfaces, or are less than it allows.
+
+        Balances, which ought to be zero, and parts that stick beside others that move.
+        """
         usual = self._given.tolerance or self._description.default_experiment.tolerance or _TOLERANCE
         tight = replace(self._experiment("tight", self._time), tolerance=_TIGHTER * usual)
         names = set(self._outputs)
@@ -305,6 +308,7 @@ class Trials(StepTrials):
             if outcome.signals is None:
                 return ()
             names &= numerics.shrinking(loose, outcome.signals)
+        names |= numerics.below(self._first, usual)
         return tuple(n for n in self._outputs if n in names)
 
     def _leak_lines(self, way: str, runner: LocalRunner, cycles: int) -> None:

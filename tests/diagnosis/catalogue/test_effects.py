@@ -10,6 +10,8 @@ from scipy.optimize import brentq
 
 from thsa_cosim.diagnosis import known_effects
 from thsa_cosim.diagnosis.catalogue.effect import Variant
+from thsa_cosim.diagnosis.catalogue.effects.asymmetric_friction import asymmetry
+from thsa_cosim.diagnosis.catalogue.effects.load_dependent_friction import friction as load_friction
 from thsa_cosim.diagnosis.catalogue.superset import build_superset
 from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL
 from thsa_cosim.fmu import Plant
@@ -200,6 +202,30 @@ def test_velocity_sensor_gain_and_delay(superset: Plant):
     delayed = run(superset, {"velocitySensorEffect.sensorDelay.tau": 0.008})["v"]
     smooth = slice(450, 850)  # at constant acceleration and speed, where Pade's approximation is exact
     np.testing.assert_allclose(delayed[smooth], np.interp(TIME - 0.008, TIME, plain)[smooth], atol=2e-6)
+
+
+def test_an_asymmetry_grows_evenly_while_a_place_sticks():
+    """A law that falls within the regularised sign is unstable there."""
+    s = np.linspace(-1.0, 1.0, 41)
+    at = {"s": s, "v": np.zeros(s.size), "z": np.zeros(s.size), "N": np.ones(s.size)}
+    friction = s + np.asarray(asymmetry({"dF": 0.9, "db": 0.0}, at))
+    assert np.diff(friction).min() > 0.0
+    friction = s + np.asarray(
+        load_friction(
+            {
+                "mu": 0.0,
+                "mu_S": 0.0,
+                "v_S": 1.0,
+                "n_S": 1.0,
+                "mu_v": 0.0,
+                "mu_2": 0.0,
+                "mu_A": 0.0,
+                "mu_D": 0.9,
+            },
+            at,
+        )
+    )
+    assert np.diff(friction).min() > 0.0
 
 
 def test_a_long_delay_is_one_at_every_change_of_speed(superset: Plant):

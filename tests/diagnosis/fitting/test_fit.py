@@ -242,6 +242,23 @@ def test_weights_return_to_one_with_the_right_model_and_rescale_what_they_are_co
     assert again is fit, "nothing changed, so nothing is fitted"
 
 
+def test_weights_stay_where_the_fit_under_new_ones_cannot_be_simulated(monkeypatch: pytest.MonkeyPatch):
+    own = bench()
+    fit = refine(own, Unknowns(FREE.members[:2]), FREE.start[:2])
+    assert fit is not None
+    levels = ChannelWeights(own)
+    asked = own.residuals
+
+    def failing(unknowns: Unknowns, vectors: np.ndarray, part: str) -> list[np.ndarray | None]:
+        return [None] * len(vectors) if part == "validate" and own.weights else asked(unknowns, vectors, part)
+
+    monkeypatch.setattr(own, "residuals", failing)
+    same, held = levels.weigh(fit)
+    assert same is fit
+    assert held is not None
+    assert own.weights == {}
+
+
 def test_what_is_held_at_its_bound_does_not_keep_the_others_from_their_optimum():
     """An amplitude that may not fall as far as it wants: rate and offset make up for it, as a bounded solver says."""
     bounded = Unknowns((unknown("a", 2.5, lower=2.3), unknown("r", 0.4), unknown("o", 0.0)))

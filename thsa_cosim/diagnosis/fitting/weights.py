@@ -27,7 +27,10 @@ class ChannelWeights:
         self._bench = bench
 
     def weigh(self, fit: Fit) -> tuple[Fit, FloatArray | None]:
-        """Weigh by what ``fit`` leaves: the fit under these weights and its held-out residuals."""
+        """Weigh by what ``fit`` leaves: the fit under these weights and its held-out residuals.
+
+        The weights stay as they are where the fit under new ones cannot be simulated on the held-out recordings.
+        """
         bench, before, after = self._bench, self._bench.weights, {}
         for name, parts in split(bench.of("fit"), self.plain(fit.residual, "fit")).items():
             after[name] = 1.0 / max(1.0, float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
@@ -36,8 +39,15 @@ class ChannelWeights:
             self.take(after)
             jacobian = fit.jacobian_of(fit.unknowns, bench.factors("fit") / factors)
             again = refine(bench, fit.unknowns, fit.vector, jacobian=jacobian, steps=fit.steps, near=True)
-            fit = fit if again is None else again
-        return fit, bench.residuals(fit.unknowns, fit.vector[None, :], "validate")[0]
+            moved = fit if again is None else again
+            held = self._held(moved)
+            if held is not None:
+                return moved, held
+            self.take(before)
+        return fit, self._held(fit)
+
+    def _held(self, fit: Fit) -> FloatArray | None:
+        return self._bench.residuals(fit.unknowns, fit.vector[None, :], "validate")[0]
 
     def take(self, weights: Mapping[str, float]) -> None:
         """Have the bench weigh by ``weights``, by channel."""

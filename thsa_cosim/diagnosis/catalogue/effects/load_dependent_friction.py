@@ -7,11 +7,11 @@ from thsa_cosim.signals import FloatArray
 
 
 def friction(p: Values, at: Connectors) -> FloatArray:
-    """(mu + mu_S exp(-(|v|/v_S)^n_S) + mu_v |v| + mu_2 |N|) |N| sgn(v) + mu_A N sgn(v) + mu_D N sgn(v)^2."""
+    """(mu + mu_S exp(-(|v|/v_S)^n_S) + mu_v |v| + mu_2 |N|) |N| sgn(v) + mu_A N sgn(v) + mu_D N |sgn(v)|."""
     load, speed, s = np.abs(at["N"]), np.abs(at["v"]), at["s"]
     share = p["mu"] + p["mu_S"] * np.exp(-((speed / p["v_S"]) ** p["n_S"])) + p["mu_v"] * speed
     return np.asarray(
-        ((share + p["mu_2"] * load) * load + p["mu_A"] * at["N"]) * s + p["mu_D"] * at["N"] * s**2
+        ((share + p["mu_2"] * load) * load + p["mu_A"] * at["N"]) * s + p["mu_D"] * at["N"] * np.abs(s)
     )
 
 
@@ -30,7 +30,7 @@ GROWTH = EffectParameter("mu_2", "1/F", 0.01, "growth of the friction per load w
 EFFECT = Effect(
     name="load-dependent-friction",
     title="Friction in proportion to the load that the pair carries",
-    physics="F = (mu + mu_S exp(-(|v|/v_S)^n_S) + mu_v |v| + mu_2 |N|) |N| sgn(v) + mu_A N sgn(v) + mu_D N sgn(v)^2",
+    physics="F = (mu + mu_S exp(-(|v|/v_S)^n_S) + mu_v |v| + mu_2 |N|) |N| sgn(v) + mu_A N sgn(v) + mu_D N |sgn(v)|",
     source="Coulomb; Lemor, SNAME 1996 (roller screws); Vahid-Araghi and Golnaraghi, Friction-Induced Vibration in"
     " Lead Screw Drives (2011); Duclusaud et al., ICRA 2025 (gears, models m3 to m6)",
     signature="current grows with the load beyond the declared lossless transmission",

@@ -18,6 +18,7 @@ from fmu_sources import build
 
 from thsa_cosim.batch import Experiment, Job, LocalRunner, Outcome, Status
 from thsa_cosim.batch.inbox import ThreadInbox
+from thsa_cosim.batch.supervisor import family
 from thsa_cosim.errors import FmuError, ParameterError, StudyError
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -417,6 +418,38 @@ def test_the_parent_may_be_interrupted_or_killed(tmp_path: Path, how: str, name:
         time.sleep(0.02)
     assert [pid for pid in workers if _runs(pid)] == []
     assert list(folder.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="supervisors are forked")
+def test_supervisors_of_a_killed_parent_clear_its_folder_in_turn(tmp_path: Path) -> None:
+    """Each ends all others of the folder: two that did so at once would both be dead before it is removed."""
+    import fcntl
+
+    script, folder = tmp_path / "script.py", tmp_path / "temporary"
+    script.write_text(textwrap.dedent(SCRIPT))
+    folder.mkdir()
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(build.lag2()), str(folder), str(build.FAULTS["slow"])],
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    with process:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("started ok 0.999")
+        (root,) = folder.iterdir()
+        descriptor = os.open(root, os.O_RDONLY)
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        process.kill()
+    time.sleep(0.5)
+    assert len(list(root.rglob("ended"))) == 2
+    assert len(family(str(root))) == 2
+    os.close(descriptor)
+    until = time.monotonic() + 10.0
+    while root.exists() and time.monotonic() < until:
+        time.sleep(0.02)
+    assert not root.exists()
+    assert family(str(root)) == []
 
 
 def _workers_of(folder: Path) -> list[int]:

@@ -62,6 +62,14 @@ def end_family(folder: str, spare: int = 0) -> None:
         time.sleep(0.002)
 
 
+def _wait_for_turn(root: str) -> None:
+    """Wait until no other supervisor clears ``root``: two that end each other at once would leave it behind."""
+    with contextlib.suppress(ImportError, OSError):
+        import fcntl
+
+        fcntl.flock(os.open(root, os.O_RDONLY), fcntl.LOCK_EX)  # released where this process ends
+
+
 def _supervise(worker: int, folder: str, root: str) -> NoReturn:
     signal.signal(signal.SIGTERM, lambda *_: os.kill(worker, signal.SIGKILL))
     poll = select.poll()
@@ -81,6 +89,8 @@ def _supervise(worker: int, folder: str, root: str) -> NoReturn:
     _, status = os.waitpid(worker, 0)
     with contextlib.suppress(OSError), open(os.path.join(folder, ENDED), "wb"):  # noqa: PTH118, PTH123
         pass
+    if orphaned:
+        _wait_for_turn(root)
     end_family(root if orphaned else folder)
     until = time.monotonic() + 1.0
     with contextlib.suppress(ChildProcessError):

@@ -154,6 +154,7 @@ class Forms:
         self.leads: dict[tuple[str, str], float] = {}
         self.started: list[Any] = []
         self.asked: list[Any] = []
+        self.curves: list[tuple[str, str]] = []
         self.screened: list[Any] = []
         self.known: dict[str, Any] = {}
         self.promised: list[Any] = []
@@ -163,6 +164,7 @@ class Forms:
         monkeypatch.setattr(room, "insignificant", lambda s: "weak" if s.candidate.key in self.weak else "")
         monkeypatch.setattr(room, "out_of_range", lambda fit: "p" if id(fit) in self.ended else "")
         monkeypatch.setattr(room, "polish", self.polish)
+        monkeypatch.setattr(room, "along_exponents", self.along)
         monkeypatch.setattr(room, "propose", self.propose)
         monkeypatch.setattr(room, "shape_starts", lambda candidate, scanned, known: [{"n": 1.0}, {"n": 2.0}])
 
@@ -173,6 +175,11 @@ class Forms:
     def polish(self, bench: Any, one: Any, current: Any, held: Any) -> Any:
         assert (bench, current, held) == (self.bench, self.current, self.held)
         self.started.append(one)
+        return one
+
+    def along(self, selection: Any, one: Any, like: Any) -> Any:
+        assert selection is self
+        self.curves.append((one.candidate.key[-1], like.candidate.key[-1]))
         return one
 
     def polished(self, one: Any) -> Any:
@@ -223,6 +230,12 @@ def test_a_form_that_fits_better_has_to_hold_on_the_held_out_recordings_and_to_b
     forms.weak.clear()
     forms.ended.add(id(better.fit))
     assert forms.best(choice, better) == ("c", ["a"])
+
+
+def test_the_choice_and_forms_of_other_blocks_are_fitted_along_their_exponents(forms: Forms):
+    choice = form("c", component="x")
+    forms.best(choice, form("a", component="x"), form("d"))
+    assert forms.curves == [("c", "c"), ("d", "c")]
 
 
 def test_a_form_that_gains_far_less_is_not_compared_unless_it_is_one_for_this_alone(forms: Forms):

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
+from thsa_cosim.diagnosis.choosing.curves import along_exponents
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, insignificant, out_of_range
 from thsa_cosim.diagnosis.choosing.score import Scored, polish
 from thsa_cosim.diagnosis.choosing.screen import Proposal, propose, shape_starts
@@ -26,6 +27,7 @@ def best_form(
     offered: Sequence[Candidate],
 ) -> tuple[Scored, tuple[Scored, ...]]:
     """The form of ``choice`` that fits best, and those that fit as well within chance; with all parameters fitted."""
+    choice = along_exponents(selection, choice, choice)
     fitted = [
         s
         for s in (*scored, *selection.fitted(_others(selection, choice, scored, proposals, offered)))
@@ -74,7 +76,7 @@ def rivals_forms(
 def _polished(selection: Selection, one: Scored, choice: Scored) -> Scored:
     """``one`` with all parameters fitted, from the optimum of ``choice`` where it may be a wider form of its block."""
     if one.candidate.component != choice.candidate.component:
-        return selection.polished(one)
+        return along_exponents(selection, selection.polished(one), choice)
     values = {**one.fit.unknowns.named(one.fit.vector), **choice.fit.unknowns.named(choice.fit.vector)}
     vector = np.array([values[name] for name in one.fit.unknowns.names])
     start = replace(one, fit=replace(one.fit, vector=vector))

@@ -131,6 +131,7 @@ def attribute(
     deep: bool = True,
     begin: Begin = lambda _weights, _base, _held: None,
     settled: float = 0.0,
+    least: float = 0.0,
     say: Say = lambda _: None,
 ) -> Attribution | None:
     """Find the effects; None if the model does not run.
@@ -138,7 +139,8 @@ def attribute(
     ``start``: what the same unknowns were fitted to before, on the same recordings (default: from the drawing).
     ``machine``: whose orders the ripples keep to. ``deep``: further starts, larger sizes, other forms and rivals count.
     ``begin``: what is found in another way first. ``settled``: structure, in standard deviations of the noise, which is
-    not looked into any more beside an effect, nor for it whether a known order is free.
+    not looked into any more beside an effect, nor for it whether a known order is free. ``least``: share of what is left
+    that an effect has to promise.
     """
     say("fitting the declared model")
     base = refine(
@@ -185,6 +187,7 @@ def attribute(
                     offered is candidates,
                     machine,
                     deep,
+                    least,
                 ).folded
             )
             if len(rounds) > 1:  # which effects are alike is told by the responses of the first
@@ -275,13 +278,17 @@ def _round(
     whole: bool,
     machine: Machine = NO_MACHINE,
     deep: bool = True,
+    least: float = 0.0,
 ) -> Round:
-    """Screen what is ``offered`` (``whole``: all effects, else parts of the last one), refine the best, choose one."""
+    """Screen what is ``offered`` (``whole``: all effects, else parts of the last one), refine the best, choose one.
+
+    None counts that promises less than the share ``least`` of what is left.
+    """
     proposals = on_orders(
         screen(selection.bench, selection.current, offered, waves), machine, selection.current
     )
     gains = largest_gains(selection.current, proposals, seed)
-    limit = threshold(gains)
+    limit = max(threshold(gains), least * selection.current.misfit)
     scored = selection.refined(proposals, limit)
     if deep and whole and proposals and selection.is_open(scored):
         further = selection.further(proposals)

@@ -10,6 +10,7 @@ does not, but knows only what acts as a force.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -33,10 +34,16 @@ def low_pass(values: FloatArray, cutoff: float, step: float, order: int = 4) -> 
 
     The ends are extended oddly by three times the order, as MATLAB's ``filtfilt`` does.
     """
+    return zero_phase(*_butterworth(order, 2.0 * cutoff * step), values)
+
+
+@lru_cache(maxsize=64)
+def _butterworth(order: int, share: float) -> tuple[FloatArray, FloatArray]:
+    """Numerator and denominator; a diagnosis asks hundreds of times, and designing takes as long as filtering."""
     from scipy import signal  # half a second to import, and few studies filter
 
-    numerator, denominator = signal.butter(order, 2.0 * cutoff * step)
-    return zero_phase(numerator, denominator, values)
+    numerator, denominator = signal.butter(order, share)
+    return numerator, denominator
 
 
 def differentiate(values: FloatArray, step: float) -> FloatArray:

@@ -200,3 +200,16 @@ def test_a_draft_of_the_standard_is_refused_by_its_name(tmp_path: Path) -> None:
         archive.writestr("modelDescription.xml", xml)
     with pytest.raises(FmuError, match=r"made for FMI 3\.0-beta\.3, a draft"):
         read_description(path)
+
+
+def test_a_description_is_read_again_only_where_the_file_has_changed(tmp_path: Path) -> None:
+    path = tmp_path / "lag.fmu"
+    path.write_bytes(build.lag2().read_bytes())
+    first = read_description(path)
+    assert read_description(path) is first
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("documentation/note.txt", "further")
+    again = read_description(path)
+    assert again is not first
+    assert again.sha256 != first.sha256
+    assert again.variables == first.variables

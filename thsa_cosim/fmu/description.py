@@ -5,7 +5,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import IO, Any
 from xml.etree import ElementTree
@@ -126,11 +126,21 @@ class FmuDescription:
 
 def read_description(path: Path | str) -> FmuDescription:
     """Read an FMU's description without unpacking it; FmuError (one sentence) if it is no usable FMU."""
+    path = Path(path)
+    try:
+        content = sha256_of(path) if path.is_file() else ""
+    except OSError:  # what cannot be read is refused as it is opened
+        content = ""
+    return _read(path, content)
+
+
+@lru_cache(maxsize=32)
+def _read(path: Path, content: str) -> FmuDescription:
+    """A study asks for the same description many times, 50 ms each; ``content``: the file's SHA-256."""
     # fmpy and lxml take 0.2 s to import: only where an FMU is really read.
     import fmpy
     from fmpy.model_description import read_model_description
 
-    path = Path(path)
     with open_archive(path) as archive:
         try:
             xml = read_text(path, archive, "modelDescription.xml")
@@ -164,7 +174,7 @@ def read_description(path: Path | str) -> FmuDescription:
     experiment = raw.defaultExperiment
     return FmuDescription(
         path=path,
-        sha256=sha256_of(path),
+        sha256=content,
         model_name=raw.modelName or "",
         fmi_version=f"{raw.fmiVersion.split('.')[0]}.0",
         tool=raw.generationTool or "",

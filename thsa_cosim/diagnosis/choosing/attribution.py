@@ -139,8 +139,8 @@ def attribute(
     ``start``: what the same unknowns were fitted to before, on the same recordings (default: from the drawing).
     ``machine``: whose orders the ripples keep to. ``deep``: further starts, larger sizes, other forms and rivals count.
     ``begin``: what is found in another way first. ``settled``: structure, in standard deviations of the noise, which is
-    not looked into any more beside an effect, nor for it whether a known order is free. ``least``: share of what is left
-    that an effect has to promise.
+    not looked into any more beside an effect, nor for it whether a known order is free. ``least``: share of what is
+    left that an effect has to promise.
     """
     say("fitting the declared model")
     base = refine(

@@ -288,7 +288,9 @@ def _round(
         screen(selection.bench, selection.current, offered, waves), machine, selection.current
     )
     gains = largest_gains(selection.current, proposals, seed)
-    limit = max(threshold(gains), least * selection.current.misfit)
+    limit = threshold(gains)
+    if least:
+        limit = max(limit, least * selection.current.misfit)
     scored = selection.refined(proposals, limit)
     if deep and whole and proposals and selection.is_open(scored):
         further = selection.further(proposals)

@@ -10,6 +10,7 @@ import numpy as np
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
 from thsa_cosim.diagnosis.fitting.inputs import draws_of, errors_of_inputs
+from thsa_cosim.diagnosis.fitting.noise import without_noise
 from thsa_cosim.diagnosis.fitting.trials import Trial, with_fmu
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.errors import StudyError
@@ -111,6 +112,7 @@ def identify_model(
             fits += [] if fit is None else [fit]
         best = min(fits, key=lambda f: f.cost, default=None)
         ends += [(f.vector, f.cost) for f in fits if f is not best]
+        best = None if best is None else without_noise(bench, best)
         validate = None if best is None else bench.residuals(unknowns, best.vector[None, :], "validate")[0]
         if best is None or validate is None:
             reason = next(iter(bench.failures), "no run succeeded")

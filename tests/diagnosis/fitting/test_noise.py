@@ -97,6 +97,12 @@ def test_columns_to_which_nothing_responds_are_passed_over():
     assert close(replace(fit, own=np.zeros_like(fit.own))) == []
 
 
+def test_what_is_known_exactly_beside_them_hides_nothing():
+    _, fit = fitted(0.0, SOLVER)
+    members = (*UNKNOWNS.members[:2], replace(UNKNOWNS.members[2], spread=1e-12))
+    assert close(replace(fit, unknowns=Unknowns(members))) == [0, 1]
+
+
 def test_a_column_that_cannot_be_taken_again_says_nothing():
     own, fit = fitted(0.0, SOLVER)
     broken = Bench(Formula(friction, fails=lambda values: True), own.trials)  # type: ignore[arg-type]

@@ -46,9 +46,10 @@ def close(fit: Fit) -> list[int]:
     size = np.linalg.norm(jacobian, axis=0)
     used = np.flatnonzero(size)
     values, directions = _combinations(jacobian[:, used] / size[used])
-    drawn = (prior[used] / size[used]) ** 2 @ directions**2
-    shares = np.abs(directions[:, (values < CLOSE**2) & (values > CLOSE * drawn)])
-    return [int(j) for j in used[np.any(shares > CLOSE, axis=1)]]
+    belong = np.abs(directions) > CLOSE  # a trace of a shape that is known exactly would outweigh all others
+    drawn = (prior[used] / size[used]) ** 2 @ (directions * belong) ** 2
+    looked_at = (values < CLOSE**2) & (values > CLOSE * drawn)
+    return [int(j) for j in used[np.any(belong[:, looked_at], axis=1)]]
 
 
 def confirmed(first: FloatArray, second: FloatArray) -> FloatArray | None:

@@ -113,6 +113,35 @@ def test_what_is_found_in_another_way_first_counts_and_is_gone_on_from_if_that_i
     assert "a note" in found.notes
 
 
+def test_what_is_fitted_beforehand_stands_beside_what_the_screening_finds():
+    """A candidate that the screening is not offered is chosen where it is the better one, and only there."""
+    offered = candidates(*NAMES)
+    for true, name in ((STRIBECK, "stribeck"), (WINDAGE, "windage")):
+        other = tuple(c for c in offered if c.effect.name != "stribeck")
+
+        def begin(weights: ChannelWeights, base: Fit, held: np.ndarray) -> Begun:
+            alone = [c for c in offered if c.name == "stribeck:motor" and not c.variant.instead]
+            proposal = max(screen(own, base, alone, {}), key=lambda p: p.gain)  # noqa: B023
+            one = score(own, base, held, proposal)  # noqa: B023
+            assert one is not None
+            return Begun((), (), base, held, tried=(one,))
+
+        own = bench(offered, true)
+        found = attribute(own, unknowns(), other, lambda _: {}, seed=1, begin=begin, most=1, deep=False)
+        assert found is not None
+        assert [s.candidate.effect.name for s in found.accepted] == [name]
+
+
+def test_what_promises_less_than_the_least_share_of_what_is_left_is_not_fitted():
+    offered = candidates(*NAMES)
+    for least, count in ((0.0, 1), (0.5, 1), (0.999, 0)):
+        found = attribute(
+            bench(offered, WINDAGE), unknowns(), offered, lambda _: {}, seed=1, most=1, least=least
+        )
+        assert found is not None
+        assert len(found.accepted) == count
+
+
 def test_less_than_what_is_settled_is_not_looked_into():
     offered = candidates(*NAMES)
     own = bench(offered, {**WINDAGE, **STRIBECK})

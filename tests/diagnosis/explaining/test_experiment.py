@@ -203,10 +203,21 @@ def test_a_profile_that_settles_comes_before_a_larger_gap_that_does_not():
 
 
 def test_one_law_under_two_names_is_separated_by_nothing(monkeypatch: pytest.MonkeyPatch):
+    judged: list[str] = []
+    whole = room._Plan._judged
+
+    def counted(plan: Any, ran: Any) -> Any:
+        judged.append(ran.profile.name)
+        return whole(plan, ran)
+
+    monkeypatch.setattr(room._Plan, "_judged", counted)
     best = find(monkeypatch, loaded, mine=loaded)
     assert best.rivals == ("windage", "stribeck:screw")
     assert best.expected == 0.0
     assert not best.separates
+    assert judged == [best.name], "fitted, they would only come nearer"
+    find(monkeypatch, slow)
+    assert len(judged) == 1 + room.JUDGED
 
 
 def test_what_separates_little_of_what_the_effect_does_is_not_counted_on(monkeypatch: pytest.MonkeyPatch):

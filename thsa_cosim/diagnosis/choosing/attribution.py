@@ -103,7 +103,8 @@ class Attribution:
 class Begun:
     """What was found before the first screening: its rounds, the effects, the model's fit with them, and what to note.
 
-    ``held`` (N,): its held-out residuals. ``goes_on``: whether further effects are looked for then.
+    ``held`` (N,): its held-out residuals. ``goes_on``: whether further effects are looked for then. ``tried``: fits
+    beside it that count in the first round as those of the screening do.
     """
 
     rounds: tuple[Round, ...]
@@ -112,6 +113,7 @@ class Begun:
     held: FloatArray
     goes_on: bool = True
     notes: tuple[str, ...] = ()
+    tried: tuple[Scored, ...] = ()
 
 
 #: The weights, the declared model's fit, and its held-out residuals (N,) → what is found at once.
@@ -188,6 +190,7 @@ def attribute(
                     machine,
                     deep,
                     least,
+                    begun.tried if begun is not None and not rounds else (),
                 ).folded
             )
             if len(rounds) > 1:  # which effects are alike is told by the responses of the first
@@ -279,10 +282,11 @@ def _round(
     machine: Machine = NO_MACHINE,
     deep: bool = True,
     least: float = 0.0,
+    tried: Sequence[Scored] = (),
 ) -> Round:
     """Screen what is ``offered`` (``whole``: all effects, else parts of the last one), refine the best, choose one.
 
-    None counts that promises less than the share ``least`` of what is left.
+    None counts that promises less than the share ``least`` of what is left. ``tried``: what is fitted already.
     """
     proposals = on_orders(
         screen(selection.bench, selection.current, offered, waves), machine, selection.current
@@ -291,7 +295,7 @@ def _round(
     limit = threshold(gains)
     if least:
         limit = max(limit, least * selection.current.misfit)
-    scored = selection.refined(proposals, limit)
+    scored = sorted([*tried, *selection.refined(proposals, limit)], key=lambda s: -s.held_out_gain)
     if deep and whole and proposals and selection.is_open(scored):
         further = selection.further(proposals)
         scored = selection.refined_further(scored, proposals, further, limit)

@@ -30,9 +30,10 @@ from thsa_cosim.signals import FloatArray
 #: The model is kept in step where an order makes up this share of the force's power. Of 23 simulated units, 9 of them
 #: with cogging, it was 0.2 to 0.75 with, and less than 0.1 without: set while looking at them.
 SHARE = 0.18
-#: The free run finds a ripple by itself if this share is left: 0.03 where it did, 0.10 to 0.71 where it ended beside
-#: the optimum. Set while looking at eight simulated units with cogging.
-FREE = 0.06
+#: The free run finds a ripple by itself if it leaves less structure than this, in variances of the noise: 0.001 to 0.06
+#: where it did, 0.17 to 230 where it ended beside the optimum or more is missing. Set while looking at 20 simulated
+#: units with cogging.
+FREE = 0.1
 #: What is followed, by means of samples, leaves a structure of its own: in step, less than the noise is not looked at.
 SETTLED = 1.0
 #: An effect beside the ripple has to promise this share of what is left: the true ones of three simulated units
@@ -75,7 +76,10 @@ class InStep:
     say: Say
 
     def begin(self, weights: ChannelWeights, base: Fit, held: FloatArray) -> Begun | None:
-        """What is found in step, if a ripple shows there and the free run then leaves less than ``held``."""
+        """What is found in step, if a ripple shows there and the free run then leaves less than ``held``.
+
+        The ripple as the free run finds it is tried in the first round, where that is enough, or the other way fails.
+        """
         if not leaves_structure(self.bench, weights, held):
             return None
         followed = self.following.followed(self.unknowns, base.vector)
@@ -86,8 +90,14 @@ class InStep:
             return None
         stepped = self.following.at(gain)
         order, share = order_in_step(stepped, followed, gain, base)
-        if share < SHARE or self._is_free(stepped, followed, gain, order, base, held):
+        if share < SHARE:
             return None
+        freely = self._added(self.bench, followed, order, base, held)
+        one = None if freely is None else freely.accepted
+        # In the first round it stands beside what the screening finds, whose starts may have led elsewhere.
+        otherwise = Begun((), (), base, held, tried=() if one is None else (one,))
+        if one is not None and weights.left(one.validate) < FREE:
+            return otherwise
         self.say(f"keeping the model in step with {followed.channel}, which lacks {order:g} waves per turn")
         stepped.weights = {}
         found = attribute(
@@ -104,9 +114,12 @@ class InStep:
             say=self.say,
         )
         if found is None:
-            return None
+            return otherwise
         self.say("letting the model run freely")
-        before, left = self.bench.weights, weights.left(held)
+        before, left = (
+            self.bench.weights,
+            min(weights.left(h) for h in (held, *(s.validate for s in otherwise.tried))),
+        )
         weights.take(stepped.weights)
         whole = self._whole(stepped, followed, gain, found)
         fit = released(self.bench, self.following, gain, whole.fit)
@@ -117,17 +130,7 @@ class InStep:
                 # A free run that falls out of step now and then says little of what else there may be.
                 return Begun(whole.rounds, accepted, fit, own, goes_on=False, notes=(NOTE,))
         weights.take(before)
-        return None
-
-    def _is_free(
-        self, stepped: Bench, followed: Followed, gain: float, order: float, base: Fit, held: FloatArray
-    ) -> bool:
-        """Whether the free run finds the ripple by itself: with what it finds, the force shows the order no more."""
-        made = self._added(self.bench, followed, order, base, held)
-        if made is None or made.accepted is None:
-            return False
-        left = order_in_step(stepped, followed, gain, made.accepted.fit)
-        return left[1] < FREE
+        return otherwise
 
     def _needed(self, accepted: tuple[Scored, ...], fit: Fit) -> tuple[tuple[Scored, ...], Fit]:
         """``accepted`` less further parts of an effect that the free run does not tell from nothing, and its fit."""

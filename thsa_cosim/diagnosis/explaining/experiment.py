@@ -128,7 +128,9 @@ class _Plan:
         without = self._without(ran)
         beside = [d / self._wanted(effect, r) for d, effect, r in zip(apart, without, ran, strict=True)]
         order = [*np.argsort(-np.array(apart))[:FARTHEST], *np.argsort(-np.array(beside))]
-        return [ran[k] for k in dict.fromkeys(map(int, order))][:JUDGED]
+        # Fitted, rivals only come nearer: where none is apart as it is, no profile is worth a closer look.
+        most = JUDGED if max(apart) >= SAFETY * SIGMAS**2 else 1
+        return [ran[k] for k in dict.fromkeys(map(int, order))][:most]
 
     def _ran(self) -> list[_Ran]:
         """Every profile of the menu that all models can run within the limits."""

@@ -125,7 +125,7 @@ def _diagnose(
                 seed=scenario.seed,
                 most=spec.most,
                 machine=machine,
-                begin=in_step.begin,
+                stuck=in_step.found,
                 say=say,
             )
     give_back()  # what the search took

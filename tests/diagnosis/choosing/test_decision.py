@@ -116,10 +116,12 @@ def test_what_is_found_in_another_way_first_counts_and_is_gone_on_from_if_that_i
 def test_what_is_fitted_beforehand_stands_beside_what_the_screening_finds():
     """A candidate that the screening is not offered is chosen where it is the better one, and only there."""
     offered = candidates(*NAMES)
+    asked: list[str] = []
     for true, name in ((STRIBECK, "stribeck"), (WINDAGE, "windage")):
         other = tuple(c for c in offered if c.effect.name != "stribeck")
 
-        def begin(weights: ChannelWeights, base: Fit, held: np.ndarray) -> Begun:
+        def stuck(weights: ChannelWeights, base: Fit, held: np.ndarray) -> Begun:
+            asked.append(name)  # noqa: B023
             alone = [c for c in offered if c.name == "stribeck:motor" and not c.variant.instead]
             proposal = max(screen(own, base, alone, {}), key=lambda p: p.gain)  # noqa: B023
             one = score(own, base, held, proposal)  # noqa: B023
@@ -127,9 +129,29 @@ def test_what_is_fitted_beforehand_stands_beside_what_the_screening_finds():
             return Begun((), (), base, held, tried=(one,))
 
         own = bench(offered, true)
-        found = attribute(own, unknowns(), other, lambda _: {}, seed=1, begin=begin, most=1, deep=False)
+        found = attribute(own, unknowns(), other, lambda _: {}, seed=1, stuck=stuck, most=1, deep=False)
         assert found is not None
         assert [s.candidate.effect.name for s in found.accepted] == [name]
+    assert asked == ["stribeck"], (
+        "where the screening leads to what leaves nothing, no other way is asked for"
+    )
+
+
+def test_effects_that_are_found_in_another_way_where_the_search_is_stuck_are_all_that_count():
+    first = diagnosed(STRIBECK, most=1)
+
+    def stuck(weights: ChannelWeights, base: Fit, held: np.ndarray) -> Begun:
+        return Begun(
+            first.rounds, first.accepted, first.final, first.final_validate, goes_on=False, notes=("a note",)
+        )
+
+    other = candidates("windage")
+    own = bench(candidates(*NAMES), STRIBECK)
+    found = attribute(own, unknowns(), other, lambda _: {}, seed=1, stuck=stuck)
+    assert found is not None
+    assert found.accepted == first.accepted
+    assert len(found.rounds) == 1
+    assert "a note" in found.notes
 
 
 def test_what_promises_less_than_the_least_share_of_what_is_left_is_not_fitted():

@@ -97,7 +97,8 @@ class Stages:
         return (self.two,)
 
     def round(self, whole: bool = True, accepted: Sequence[Any] = ()) -> room.Round:
-        return room._round(self, OFFERED, WAVES, 7, accepted, whole)  # type: ignore[arg-type]
+        screened = room._screened(self, OFFERED, WAVES, 7)  # type: ignore[arg-type]
+        return room._round(self, OFFERED, screened, 7, accepted, whole)  # type: ignore[arg-type]
 
 
 OFFERED: Any = object()

@@ -132,6 +132,7 @@ def attribute(
     machine: Machine = NO_MACHINE,
     deep: bool = True,
     begin: Begin = lambda _weights, _base, _held: None,
+    stuck: Begin = lambda _weights, _base, _held: None,
     settled: float = 0.0,
     least: float = 0.0,
     say: Say = lambda _: None,
@@ -140,9 +141,10 @@ def attribute(
 
     ``start``: what the same unknowns were fitted to before, on the same recordings (default: from the drawing).
     ``machine``: whose orders the ripples keep to. ``deep``: further starts, larger sizes, other forms and rivals count.
-    ``begin``: what is found in another way first. ``settled``: structure, in standard deviations of the noise, which is
-    not looked into any more beside an effect, nor for it whether a known order is free. ``least``: share of what is
-    left that an effect has to promise.
+    ``begin``: what is found in another way first. ``stuck``: what is found in another way where nothing that the first
+    screening leads to leaves nothing; effects that it finds are all that count. ``settled``: structure, in standard
+    deviations of the noise, which is not looked into any more beside an effect, nor for it whether a known order is
+    free. ``least``: share of what is left that an effect has to promise.
     """
     say("fitting the declared model")
     base = refine(
@@ -179,19 +181,17 @@ def attribute(
             selection = Selection(bench, weights, current, current_held, say)
             free = [c for c in offered if not any(_is_taken(c, s.candidate) for s in accepted)]
             left = [c for c in free if not _is_known(c, current)]
+            own = seed + len(rounds)
+            screened = _screened(selection, left, scan(current), own, machine, least)
+            if not rounds and selection.is_open(screened.scored):
+                otherwise = stuck(weights, base, held)
+                if otherwise is not None and otherwise.accepted:
+                    begun, rounds, accepted = otherwise, [*otherwise.rounds], [*otherwise.accepted]
+                    current, current_held = otherwise.fit, otherwise.held
+                    break
+                screened = screened.beside(() if otherwise is None else otherwise.tried)
             rounds.append(
-                _round(
-                    selection,
-                    left,
-                    scan(current),
-                    seed + len(rounds),
-                    accepted,
-                    offered is candidates,
-                    machine,
-                    deep,
-                    least,
-                    begun.tried if begun is not None and not rounds else (),
-                ).folded
+                _round(selection, left, screened, own, accepted, offered is candidates, deep).folded
             )
             if len(rounds) > 1:  # which effects are alike is told by the responses of the first
                 rounds[-1] = replace(rounds[-1], proposals=tuple(p.summary for p in rounds[-1].proposals))
@@ -272,22 +272,29 @@ def _is_taken(candidate: Candidate, accepted: Candidate) -> bool:
     return candidate.key == accepted.key or alternative
 
 
-def _round(
+@dataclass(frozen=True, eq=False)
+class _Screened:
+    """What a screening proposes (best first), what chance gains, and what of it is refined (best first)."""
+
+    proposals: list[Proposal]
+    gains: FloatArray
+    limit: float
+    scored: list[Scored]
+
+    def beside(self, tried: Sequence[Scored]) -> "_Screened":
+        """The same with ``tried`` among what is refined."""
+        return replace(self, scored=sorted([*tried, *self.scored], key=lambda s: -s.held_out_gain))
+
+
+def _screened(
     selection: Selection,
     offered: Sequence[Candidate],
     waves: Mapping[str, Sequence[float]],
     seed: int,
-    accepted: Sequence[Scored],
-    whole: bool,
     machine: Machine = NO_MACHINE,
-    deep: bool = True,
     least: float = 0.0,
-    tried: Sequence[Scored] = (),
-) -> Round:
-    """Screen what is ``offered`` (``whole``: all effects, else parts of the last one), refine the best, choose one.
-
-    None counts that promises less than the share ``least`` of what is left. ``tried``: what is fitted already.
-    """
+) -> _Screened:
+    """Screen what is ``offered`` and refine the best; none counts that promises less than ``least`` of what is left."""
     proposals = on_orders(
         screen(selection.bench, selection.current, offered, waves), machine, selection.current
     )
@@ -295,7 +302,20 @@ def _round(
     limit = threshold(gains)
     if least:
         limit = max(limit, least * selection.current.misfit)
-    scored = sorted([*tried, *selection.refined(proposals, limit)], key=lambda s: -s.held_out_gain)
+    return _Screened(proposals, gains, limit, selection.refined(proposals, limit))
+
+
+def _round(
+    selection: Selection,
+    offered: Sequence[Candidate],
+    screened: _Screened,
+    seed: int,
+    accepted: Sequence[Scored],
+    whole: bool,
+    deep: bool = True,
+) -> Round:
+    """Choose one of what is ``offered`` (``whole``: all effects, else parts of the last one) and ``screened``."""
+    proposals, gains, limit, scored = screened.proposals, screened.gains, screened.limit, screened.scored
     if deep and whole and proposals and selection.is_open(scored):
         further = selection.further(proposals)
         scored = selection.refined_further(scored, proposals, further, limit)

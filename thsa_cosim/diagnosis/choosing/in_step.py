@@ -64,7 +64,7 @@ def _beside(fit: Fit, proposal: Proposal) -> Fit:
 
 @dataclass(frozen=True, eq=False)
 class InStep:
-    """How to begin an attribution of ``unknowns`` and ``candidates`` on ``bench`` in step."""
+    """How to find effects in step, of ``unknowns`` and ``candidates`` on ``bench``."""
 
     bench: Bench
     following: Following
@@ -75,7 +75,7 @@ class InStep:
     seed: int
     say: Say
 
-    def begin(self, weights: ChannelWeights, base: Fit, held: FloatArray) -> Begun | None:
+    def found(self, weights: ChannelWeights, base: Fit, held: FloatArray) -> Begun | None:
         """What is found in step, if a ripple shows there and the free run then leaves less than ``held``.
 
         The ripple as the free run finds it is tried in the first round, where that is enough, or the other way fails.

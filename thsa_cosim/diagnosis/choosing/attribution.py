@@ -103,8 +103,8 @@ class Attribution:
 class Begun:
     """What was found before the first screening: its rounds, the effects, the model's fit with them, and what to note.
 
-    ``held`` (N,): its held-out residuals. ``goes_on``: whether further effects are looked for then. ``tried``: fits
-    beside it that count in the first round as those of the screening do.
+    ``held`` (N,): its held-out residuals. ``goes_on``: whether further effects are looked for then. ``tried``: further
+    fits that count in the first round as those of the screening do.
     """
 
     rounds: tuple[Round, ...]

@@ -13,7 +13,7 @@ equation
   F = ((mu + (if mu_S > 0 or mu_S < 0 then mu_S*exp(-((v^2 + 1e-12*v_S^2)/v_S^2)^(n_S/2)) else 0) + mu_v*v*s + mu_2*noEvent(abs(N)))
     *noEvent(abs(N)) + mu_A*N)*s + mu_D*N*noEvent(abs(s));
   annotation(Documentation(info="<html><p>(mu + mu_S exp(&minus;(|v|/v_S)<sup>n_S</sup>) + mu_v |v| + mu_2 |N|) |N| sgn(v) + mu_A N sgn(v)
-+ mu_D N sgn(v)<sup>2</sup>: gears and threads lose a share of the load, more of it as sliding begins, more of it where the load
++ mu_D N |sgn(v)|: gears and threads lose a share of the load, more of it as sliding begins, more of it where the load
 squeezes out the lubricant, another share where the load drives than where it is driven (efficiencies 1/(1 + mu + mu_D) and
 1 &minus; mu + mu_D), and another on the other flank.</p></html>"));
 end LoadDependentFriction;

@@ -86,8 +86,7 @@ def test_a_search_that_only_describes_is_no_deep_one(monkeypatch: pytest.MonkeyP
     assert found.rounds[0].rivals == found.rounds[0].forms == ()
 
 
-@pytest.mark.parametrize("goes_on", [True, False])
-def test_what_is_found_in_another_way_first_counts_and_is_gone_on_from_if_that_is_asked(goes_on: bool):
+def test_what_is_found_in_another_way_first_counts_and_is_gone_on_from():
     offered = candidates(*NAMES)
     first = diagnosed({**WINDAGE, **STRIBECK}, most=1)
 
@@ -99,7 +98,6 @@ def test_what_is_found_in_another_way_first_counts_and_is_gone_on_from_if_that_i
             first.accepted,
             first.final,
             first.final_validate,
-            goes_on=goes_on,
             notes=("a note",),
         )
 
@@ -108,8 +106,8 @@ def test_what_is_found_in_another_way_first_counts_and_is_gone_on_from_if_that_i
     assert found is not None
     names = [s.candidate.effect.name for s in found.accepted]
     assert names[0] == first.accepted[0].candidate.effect.name
-    assert sorted(names) == (["stribeck", "windage"] if goes_on else names)
-    assert len(found.rounds) == (2 if goes_on else 1)
+    assert sorted(names) == ["stribeck", "windage"]
+    assert len(found.rounds) == 2
     assert "a note" in found.notes
 
 
@@ -141,9 +139,7 @@ def test_effects_that_are_found_in_another_way_where_the_search_is_stuck_are_all
     first = diagnosed(STRIBECK, most=1)
 
     def stuck(weights: ChannelWeights, base: Fit, held: np.ndarray) -> Begun:
-        return Begun(
-            first.rounds, first.accepted, first.final, first.final_validate, goes_on=False, notes=("a note",)
-        )
+        return Begun(first.rounds, first.accepted, first.final, first.final_validate, notes=("a note",))
 
     other = candidates("windage")
     own = bench(candidates(*NAMES), STRIBECK)

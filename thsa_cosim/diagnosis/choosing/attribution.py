@@ -101,17 +101,16 @@ class Attribution:
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """What was found before the first screening: its rounds, the effects, the model's fit with them, and what to note.
+    """What was found in another way than by screening: rounds, effects, the model's fit with them, and what to note.
 
-    ``held`` (N,): its held-out residuals. ``goes_on``: whether further effects are looked for then. ``tried``: further
-    fits that count in the first round as those of the screening do.
+    ``held`` (N,): its held-out residuals. ``tried``: further fits that count in the first round as those of the
+    screening do.
     """
 
     rounds: tuple[Round, ...]
     accepted: tuple[Scored, ...]
     fit: Fit
     held: FloatArray
-    goes_on: bool = True
     notes: tuple[str, ...] = ()
     tried: tuple[Scored, ...] = ()
 
@@ -141,10 +140,10 @@ def attribute(
 
     ``start``: what the same unknowns were fitted to before, on the same recordings (default: from the drawing).
     ``machine``: whose orders the ripples keep to. ``deep``: further starts, larger sizes, other forms and rivals count.
-    ``begin``: what is found in another way first. ``stuck``: what is found in another way where nothing that the first
-    screening leads to leaves nothing; effects that it finds are all that count. ``settled``: structure, in standard
-    deviations of the noise, which is not looked into any more beside an effect, nor for it whether a known order is
-    free. ``least``: share of what is left that an effect has to promise.
+    ``begin``: what is found in another way first, and gone on from. ``stuck``: what is found in another way where
+    nothing that the first screening leads to leaves nothing; effects that it finds are all that count. ``settled``:
+    structure, in standard deviations of the noise, which is not looked into any more beside an effect, nor for it
+    whether a known order is free. ``least``: share of what is left that an effect has to promise.
     """
     say("fitting the declared model")
     base = refine(
@@ -169,7 +168,7 @@ def attribute(
     begun = begin(weights, base, held)
     if begun is not None:
         rounds, accepted, current, current_held = [*begun.rounds], [*begun.accepted], begun.fit, begun.held
-    for _ in range(0 if begun is not None and not begun.goes_on else most):
+    for _ in range(most):
         if accepted and weights.left(current_held) < SMALLEST_STRUCTURE**2:
             break
         if accepted and settled and not leaves_structure(bench, weights, current_held, settled):

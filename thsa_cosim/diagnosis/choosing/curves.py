@@ -11,9 +11,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
-from thsa_cosim.diagnosis.choosing.score import Scored, judge
+from thsa_cosim.diagnosis.choosing.score import Scored, judge, refine_own
 from thsa_cosim.diagnosis.choosing.selection import Selection
-from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
+from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.signals import FloatArray
 
 #: Exponents from which a fit sets out: those of the literature (1 and 2), and about them.
@@ -40,19 +40,7 @@ def along_exponents(selection: Selection, one: Scored, like: Scored) -> Scored:
         residual = bench.residuals(known.unknowns, vector[None, :], "fit")[0]
         if residual is None:
             continue
-        jacobian = known.jacobian.copy(order="F")
-        jacobian[:, own], steps = columns(bench, known.unknowns, vector, residual, own, known.steps)
-        fit = refine(
-            bench,
-            known.unknowns,
-            vector,
-            residual=residual,
-            jacobian=jacobian,
-            steps=steps,
-            fresh=own,
-            iterations=4,
-            enough=3.0,
-        )
+        fit = refine_own(bench, known.unknowns, vector, own, residual, known.jacobian, known.steps)
         if fit is not None and not np.allclose(fit.vector[own], known.vector[own], rtol=ARRIVED):
             tried.append(fit)
     best = known

@@ -116,10 +116,8 @@ class InStep:
         if found is None:
             return otherwise
         self.say("letting the model run freely")
-        before, left = (
-            self.bench.weights,
-            min(weights.left(h) for h in (held, *(s.validate for s in otherwise.tried))),
-        )
+        before = self.bench.weights
+        left = min(weights.left(h) for h in (held, *(s.validate for s in otherwise.tried)))
         weights.take(stepped.weights)
         whole = self._whole(stepped, followed, gain, found)
         fit = released(self.bench, self.following, gain, whole.fit)
@@ -128,7 +126,7 @@ class InStep:
             fit, own = weights.weigh(fit)
             if own is not None and not out_of_range(fit) and weights.left(own) < left:
                 # A free run that falls out of step now and then says little of what else there may be.
-                return Begun(whole.rounds, accepted, fit, own, goes_on=False, notes=(NOTE,))
+                return Begun(whole.rounds, accepted, fit, own, notes=(NOTE,))
         weights.take(before)
         return otherwise
 

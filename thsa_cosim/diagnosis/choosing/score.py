@@ -74,19 +74,34 @@ def score(
         return None
     jacobian = np.concatenate([current.jacobian, np.zeros((residual.size, len(new)))], axis=1)
     steps = np.concatenate([current.steps, np.full(len(new), 1e-2)])
-    jacobian[:, new], steps = columns(bench, unknowns, trials[best], residual, new, steps)
-    fit = refine(
+    fit = refine_own(bench, unknowns, trials[best], new, residual, jacobian, steps, iterations)
+    return None if fit is None else judge(bench, proposal, fit.sharing(current.jacobian), current, held)
+
+
+def refine_own(
+    bench: Bench,
+    unknowns: Unknowns,
+    vector: FloatArray,
+    own: list[int],
+    residual: FloatArray,
+    jacobian: FloatArray,
+    steps: FloatArray,
+    iterations: int = 4,
+) -> Fit | None:
+    """A fit from ``vector`` (n,), by the columns ``own`` taken anew in each iteration and the others as they are."""
+    jacobian = jacobian.copy(order="F")
+    jacobian[:, own], steps = columns(bench, unknowns, vector, residual, own, steps)
+    return refine(
         bench,
         unknowns,
-        trials[best],
+        vector,
         residual=residual,
         jacobian=jacobian,
         steps=steps,
-        fresh=new,
+        fresh=own,
         iterations=iterations,
         enough=3.0,
     )
-    return None if fit is None else judge(bench, proposal, fit.sharing(current.jacobian), current, held)
 
 
 def go_on(bench: Bench, scored: Scored, current: Fit, held: FloatArray, iterations: int = 4) -> Scored:

@@ -1,5 +1,6 @@
 """A page's figure as a matplotlib figure: the same numbers in the same places."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,11 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from thsa_cosim.report.page.write import figures_of
 from thsa_cosim.report.parts import drawing
 from thsa_cosim.report.parts.axes import Panel
 from thsa_cosim.report.parts.chart import BEFORE, Chart
+from thsa_cosim.report.parts.content import Fold, Section
 from thsa_cosim.report.parts.drawing import draw
 
 
@@ -31,8 +34,11 @@ def test_lines_bands_levels_and_scales_are_those_of_the_page() -> None:
     assert (left.get_yscale(), left.get_ylim()) == ("log", (1.0, 100.0))
     assert (left.get_xlabel(), left.get_title(loc="left")) == ("time [s]", "left")
     assert left.get_position().x1 < right.get_position().x0
-    bars = right.collections[0].get_segments()
-    assert bars[0][1][1] - bars[0][0][1] == pytest.approx(0.2, rel=1e-5)
+    bars, points = right.lines
+    ends = bars.get_ydata().reshape(-1, 3)
+    np.testing.assert_allclose(ends[:, 1] - ends[:, 0], 0.2 * x, rtol=1e-5)
+    np.testing.assert_allclose(ends[:, :2].mean(axis=1), points.get_ydata(), rtol=1e-5)
+    assert np.isnan(ends[:, 2]).all()
 
 
 def test_bars_stand_beside_each_other_and_a_legend_names_each_once() -> None:
@@ -45,6 +51,16 @@ def test_bars_stand_beside_each_other_and_a_legend_names_each_once() -> None:
     assert before.get_x() + before.get_width() <= after.get_x() + 1e-9
     assert [text.get_text() for text in sheet.legends[0].get_texts()] == ["before", "after"]
     assert sheet._repr_png_().startswith(b"\x89PNG")
+
+
+def test_details_of_another_figure_are_on_the_page_but_in_no_file() -> None:
+    whole, detail, other = (
+        replace(Chart(name).build(""), name=name) for name in ("whole", "detail", "other")
+    )
+    blocks = (whole, Fold("more", (detail,), details=True), Fold("another recording", (other,)))
+    section = Section("structure", "Structure", blocks)
+    assert list(figures_of([section])) == ["whole", "detail", "other"]
+    assert list(figures_of([section], details=False)) == ["whole", "other"]
 
 
 def test_contours_leave_out_what_is_not_known() -> None:

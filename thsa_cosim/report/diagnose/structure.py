@@ -77,7 +77,11 @@ def structure(part: Part) -> Section | None:
     for k, (channel, own) in enumerate(by_channel.items()):
         figure = _figure(f"{part.prefix}dependence-{k}", own)
         blocks.append(
-            Fold(f"Residual of {channel} over {count(len(own), 'variable')}, the clearest first", (figure,))
+            Fold(
+                f"Residual of {channel} over {count(len(own), 'variable')}, the clearest first",
+                (figure,),
+                details=True,
+            )
         )
     law: Json | None = (part.result or {}).get("empirical")
     if law:

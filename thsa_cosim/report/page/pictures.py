@@ -18,16 +18,22 @@ _GROUP = re.compile(r"(?<=^fit)-|(?<=^validate)-|(?<=^response)-|(?<=^law)-|(?<=
 """Between the group that a figure belongs to and its own name."""
 
 
-def pictures(folder: Path) -> Mapping[str, Figure]:
-    """The figures of a study's page by name, in its order; InputError for a folder that is no study."""
+def pictures(folder: Path, details: bool = True) -> Mapping[str, Figure]:
+    """The figures of a study's page by name, in its order, with or without those of ``details``.
+
+    InputError for a folder that is no study.
+    """
     study = read_study(folder)
-    found = figures_of(sections(study))
+    found = figures_of(sections(study), details)
     alone = law_figures(study.whole.result) if study.whole.result is not None else []
     return {**found, **{figure.name: figure for figure in alone}}
 
 
 def write_pictures(folder: Path) -> list[Path]:
-    """Write every figure of the study as ``plots/<name>.png``; return the paths, none without matplotlib."""
+    """Write the figures of the study as ``plots/<name>.png``, but those of details.
+
+    Returns the paths, none without matplotlib.
+    """
     if importlib.util.find_spec("matplotlib") is None:
         _log.warning(
             "No PNG files without matplotlib: pip install 'thsa-cosim[notebook]'; the page has every plot."
@@ -38,5 +44,5 @@ def write_pictures(folder: Path) -> list[Path]:
 
     return [
         save(figure, folder / FOLDER / f"{file_name(_GROUP.sub('_', name))}.png")
-        for name, figure in pictures(folder).items()
+        for name, figure in pictures(folder, details=False).items()
     ]

@@ -150,9 +150,9 @@ def render(heading: Heading, shown: Sequence[Section]) -> str:
     )
 
 
-def figures_of(shown: Sequence[Section]) -> dict[str, Figure]:
-    """All figures of the sections by name, in their order."""
-    return {figure.name: figure for section in shown for figure in _figures(section.blocks)}
+def figures_of(shown: Sequence[Section], details: bool = True) -> dict[str, Figure]:
+    """The figures of the sections by name, in their order, with or without those of ``details``."""
+    return {figure.name: figure for section in shown for figure in _figures(section.blocks, details)}
 
 
 def _figure_data(figure: Figure) -> dict[str, object]:
@@ -160,13 +160,13 @@ def _figure_data(figure: Figure) -> dict[str, object]:
     return {"data": content["data"], "layout": content["layout"]}
 
 
-def _figures(blocks: Sequence[Block]) -> list[Figure]:
+def _figures(blocks: Sequence[Block], details: bool) -> list[Figure]:
     found: list[Figure] = []
     for block in blocks:
         if isinstance(block, Figure):
             found.append(block)
-        elif isinstance(block, Fold):
-            found += _figures(block.blocks)
+        elif isinstance(block, Fold) and (details or not block.details):
+            found += _figures(block.blocks, details)
     return found
 
 

@@ -85,12 +85,16 @@ class Facts:
 
 @dataclass(frozen=True)
 class Fold:
-    """Blocks that are hidden under a ``title`` until it is opened; printed in any case."""
+    """Blocks that are hidden under a ``title`` until it is opened; printed in any case.
+
+    ``details``: another figure shows the most of it; no file is drawn of it unasked.
+    """
 
     template: ClassVar[str] = "fold"
     title: str
     blocks: Sequence["Block"]
     is_open: bool = False
+    details: bool = False
 
 
 Block = Table | Figure | Text | Facts | Fold

@@ -185,9 +185,14 @@ def _scatter(axes: Axes, trace: Trace, _every: Sequence[Trace]) -> Any:
         style["mec"] = _colour(marker.get("line", {}).get("color", marker["color"]))
         style["mew"] = marker.get("line", {}).get("width", 1)
     if "error_y" in trace:
-        errors = _values(trace["error_y"]["array"])
-        return axes.errorbar(x, y, yerr=errors, capsize=2, elinewidth=0.9, **style)
+        _whiskers(axes, x, y, _values(trace["error_y"]["array"]), style["color"])
     return axes.plot(x, y, **style)[0]
+
+
+def _whiskers(axes: Axes, x: FloatArray, y: FloatArray, errors: FloatArray, colour: Any) -> None:
+    """Error bars as one line: matplotlib's own take three artists and ten times as long."""
+    ends = np.stack([y - errors, y + errors, np.full(y.size, np.nan)], axis=1).ravel()
+    axes.plot(np.repeat(x, 3), ends, color=colour, lw=0.9, marker="_", ms=4, mew=0.9)
 
 
 def _bar(axes: Axes, trace: Trace, every: Sequence[Trace]) -> Any:

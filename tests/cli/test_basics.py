@@ -260,5 +260,5 @@ def test_full_collections_are_rare_in_a_command() -> None:
     done = subprocess.run(
         [sys.executable, "-c", program, "--version"], capture_output=True, text=True, timeout=60, check=True
     )
-    young, middle, _ = gc.get_threshold()
-    assert done.stdout.splitlines()[-1] == str((young, middle, 100))
+    _, middle, _ = gc.get_threshold()
+    assert done.stdout.splitlines()[-1] == str((10_000, middle, 100))

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,8 @@ import pytest
 from thsa_cosim.cli import run_command
 from thsa_cosim.diagnosis import known_effects
 from thsa_cosim.diagnosis.catalogue.superset import build_superset
+from thsa_cosim.diagnosis.choosing.in_step import InStep
+from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.fmu import Plant
 from thsa_cosim.signals import Signals
 
@@ -56,7 +59,12 @@ def test_a_cogging_that_makes_the_shaft_stick_is_found_in_step(
 ) -> None:
     """The free run finds this one by itself: that is left out, so that the way in step is seen to lead there."""
     monkeypatch.setattr("thsa_cosim.diagnosis.choosing.selection.Selection.is_open", lambda *_: True)
-    monkeypatch.setattr("thsa_cosim.diagnosis.choosing.in_step.FREE", 0.0)
+    added = InStep._added
+
+    def only_in_step(self: InStep, stepped: Bench, *rest: Any) -> Any:
+        return None if stepped is self.bench else added(self, stepped, *rest)
+
+    monkeypatch.setattr(InStep, "_added", only_in_step)
     effects = [known_effects()["cogging"]]
     fmu, *_ = build_superset("Actuator", ROOT / "modelica" / "THSA", effects, tmp_path / "plant")
     with Plant.open(fmu) as plant:

@@ -1,8 +1,12 @@
 """The order of what a place lacks, from the force that keeps it in step."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
+from thsa_cosim.diagnosis.choosing import in_step
 from thsa_cosim.diagnosis.choosing.observer import FEWEST, ORDERS, order_shares
 
 TIME = np.arange(40_000) * 1e-3
@@ -54,3 +58,29 @@ def test_a_wave_that_is_not_resolved_or_hardly_passed_says_nothing():
     assert order_shares([TIME[:few]], [SPEED[:few]], [noise(1.0)[:few]]).max() == 0.0
     assert order_shares([TIME], [np.zeros(TIME.size)], [noise(1.0)]).max() == 0.0
     assert order_shares([], [], []).max() == 0.0
+
+
+def test_a_looser_model_shows_more_of_a_ripple_and_less_of_the_noise_of_what_it_follows(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """A shaft of inertia 1 with a ripple, and a model without, in step by a gain; that of ``InStep`` is looser."""
+    step, order, off = float(TIME[1]), 24, noise(2e-3)
+
+    def share(gain: float) -> tuple[float, float]:
+        pull = gain * step
+        error = lfilter([1.0], [1.0, pull - 1.0], pull * off - 0.3 * step * np.sin(order * ANGLE))
+        shares = order_shares([TIME], [SPEED], [gain * (error - off)])
+        return float(ORDERS[np.argmax(shares)]), float(shares.max())
+
+    asked: list[float] = []
+
+    class Follower:
+        def at(self, gain: float) -> float:
+            asked.append(gain)
+            return gain
+
+    monkeypatch.setattr(in_step, "order_in_step", lambda bench, _followed, gain, _fit: share(gain))
+    found, loose = in_step.InStep._order(SimpleNamespace(following=Follower()), None, 600.0, None)  # type: ignore[arg-type]
+    assert asked == [in_step.LOOSER * 600.0]
+    assert found == order
+    assert loose > 1.5 * share(600.0)[1]

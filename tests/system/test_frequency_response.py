@@ -60,9 +60,9 @@ def test_a_sampled_loop_has_the_margins_of_its_pulse_transfer_function(tmp_path:
 
 
 def test_a_loop_integrated_as_one_has_the_continuous_transfer_function(tmp_path: Path) -> None:
-    interval = 2.5e-3  # corner of the loop: 20 rad/s, of what is compared: 50 rad/s
+    interval = 2.5e-3  # up to 126 rad/s are compared; the corner is at 20
     found = measured(tmp_path, Part("controller", build.lag2()), 5.0, interval)
-    slow = found.omega < 0.02 * 2.0 * np.pi / interval
+    slow = found.omega < 0.05 * 2.0 * np.pi / interval
     exact = 5.0 / (1.0 + 1j * found.omega * TAU)
     assert np.max(np.abs(found.response[slow] - exact[slow])) < 0.02
 

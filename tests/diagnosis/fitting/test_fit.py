@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -190,6 +191,38 @@ def test_columns_that_are_kept_are_not_simulated_again():
     assert fit is not None
     assert again.evaluations < 20
     np.testing.assert_allclose(fit.vector, first.vector, atol=1e-3)
+
+
+def test_columns_anew_are_taken_before_the_first_step_and_the_given_ones_are_left_alone(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    first = refine(bench(), FREE, FREE.start)
+    assert first is not None
+    given = first.jacobian.copy()
+    given[:, 2] = 0.0
+    asked: list[list[int]] = []
+
+    def counted(own: Bench, unknowns: Unknowns, vector: np.ndarray, *more: Any) -> Any:
+        asked.append(more[1])
+        return columns(own, unknowns, vector, *more)
+
+    monkeypatch.setattr("thsa_cosim.diagnosis.fitting.fit.columns", counted)
+    for anew in (True, False):
+        fit = refine(
+            bench(),
+            FREE,
+            first.vector,
+            residual=first.residual,
+            jacobian=given,
+            steps=first.steps,
+            fresh=[2],
+            anew=anew,
+            iterations=1,
+        )
+        assert fit is not None
+        assert fit.jacobian[:, 2].any() == anew
+    assert asked == [[2]]
+    assert not given[:, 2].any()
 
 
 def test_unknowns_of_a_temperature_reach_only_its_recordings():

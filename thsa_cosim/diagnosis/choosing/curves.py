@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
-from thsa_cosim.diagnosis.choosing.score import Scored, judge, refine_own
+from thsa_cosim.diagnosis.choosing.score import Scored, judge
 from thsa_cosim.diagnosis.choosing.selection import Selection
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.signals import FloatArray
@@ -40,7 +40,18 @@ def along_exponents(selection: Selection, one: Scored, like: Scored) -> Scored:
         residual = bench.residuals(known.unknowns, vector[None, :], "fit")[0]
         if residual is None:
             continue
-        fit = refine_own(bench, known.unknowns, vector, own, residual, known.jacobian, known.steps)
+        fit = refine(
+            bench,
+            known.unknowns,
+            vector,
+            residual=residual,
+            jacobian=known.jacobian,
+            steps=known.steps,
+            fresh=own,
+            anew=True,
+            iterations=4,
+            enough=3.0,
+        )
         if fit is not None and not np.allclose(fit.vector[own], known.vector[own], rtol=ARRIVED):
             tried.append(fit)
     best = known

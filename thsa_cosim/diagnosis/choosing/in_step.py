@@ -92,7 +92,6 @@ class InStep:
         gain = self.following.gain(self.unknowns, base.vector)
         if gain is None:
             return None
-        stepped = self.following.at(gain)
         order, share = self._order(followed, gain, base)
         if share < SHARE:
             return None
@@ -103,6 +102,7 @@ class InStep:
         if one is not None and weights.left(one.validate) < FREE:
             return otherwise
         self.say(f"keeping the model in step with {followed.channel}, which lacks {order:g} waves per turn")
+        stepped = self.following.at(gain)
         stepped.weights = {}
         found = attribute(
             stepped,

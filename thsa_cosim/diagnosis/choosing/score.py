@@ -8,7 +8,7 @@ import numpy as np
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.bench import Bench
-from thsa_cosim.diagnosis.fitting.fit import Fit, columns, refine
+from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.diagnosis.fitting.structure import block_squares, consistency, relative_consistency, structure
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
 from thsa_cosim.signals import FloatArray
@@ -74,34 +74,19 @@ def score(
         return None
     jacobian = np.concatenate([current.jacobian, np.zeros((residual.size, len(new)))], axis=1)
     steps = np.concatenate([current.steps, np.full(len(new), 1e-2)])
-    fit = refine_own(bench, unknowns, trials[best], new, residual, jacobian, steps, iterations)
-    return None if fit is None else judge(bench, proposal, fit.sharing(current.jacobian), current, held)
-
-
-def refine_own(
-    bench: Bench,
-    unknowns: Unknowns,
-    vector: FloatArray,
-    own: list[int],
-    residual: FloatArray,
-    jacobian: FloatArray,
-    steps: FloatArray,
-    iterations: int = 4,
-) -> Fit | None:
-    """A fit from ``vector`` (n,), by the columns ``own`` taken anew in each iteration and the others as they are."""
-    jacobian = jacobian.copy(order="F")
-    jacobian[:, own], steps = columns(bench, unknowns, vector, residual, own, steps)
-    return refine(
+    fit = refine(
         bench,
         unknowns,
-        vector,
+        trials[best],
         residual=residual,
         jacobian=jacobian,
         steps=steps,
-        fresh=own,
+        fresh=new,
+        anew=True,
         iterations=iterations,
         enough=3.0,
     )
+    return None if fit is None else judge(bench, proposal, fit.sharing(current.jacobian), current, held)
 
 
 def go_on(bench: Bench, scored: Scored, current: Fit, held: FloatArray, iterations: int = 4) -> Scored:

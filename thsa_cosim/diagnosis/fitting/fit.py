@@ -167,6 +167,7 @@ def refine(
     jacobian: FloatArray | None = None,
     steps: FloatArray | None = None,
     fresh: list[int] | None = None,
+    anew: bool = False,
     near: bool = False,
     iterations: int = 8,
     enough: float = 1.0,
@@ -174,11 +175,12 @@ def refine(
 ) -> Fit | None:
     """Minimise the fit recordings' squared residuals from ``vector`` (n,).
 
-    ``jacobian`` (N, n) is used as given at the start; in later iterations the columns ``fresh`` are taken anew. Without
-    ``fresh`` all of them are, but not before a step gains less than SERVED of what it promised, or the fit would end:
-    it ends by no Jacobian of another vector, which a given one is if it is ``near``. Stops when a step promises or
-    brings less than ``enough`` mean squares of what is left (at least of the noise), or so little that the cost
-    ``to_beat``, reached elsewhere, is HOPELESS steps away. None if the start cannot be simulated.
+    ``jacobian`` (N, n) is used as given at the start, unless its columns ``fresh`` are to be taken ``anew`` there, too;
+    in later iterations they are. Without ``fresh`` all of them are, but not before a step gains less than SERVED of
+    what it promised, or the fit would end: it ends by no Jacobian of another vector, which a given one is if it is
+    ``near``. Stops when a step promises or brings less than ``enough`` mean squares of what is left (at least of the
+    noise), or so little that the cost ``to_beat``, reached elsewhere, is HOPELESS steps away. None if the start cannot
+    be simulated.
     """
     n = len(unknowns.members)
     vector = unknowns.clip(vector)
@@ -189,7 +191,12 @@ def refine(
     steps = np.full(n, 1e-2) if steps is None else steps
     renew = list(range(n)) if fresh is None else fresh
     jacobian = np.zeros((residual.size, n), order="F") if jacobian is None else jacobian.copy(order="F")
-    cost, damping, converged, stale = cost_of(unknowns, vector, residual), 1e-6, False, not jacobian.any()
+    cost, damping, converged, stale = (
+        cost_of(unknowns, vector, residual),
+        1e-6,
+        False,
+        anew or not jacobian.any(),
+    )
     response: float | None = None
     left = iterations
     while left:

@@ -16,6 +16,7 @@ from thsa_cosim.diagnosis.choosing.attribution import attribute
 from thsa_cosim.diagnosis.choosing.in_step import InStep
 from thsa_cosim.diagnosis.choosing.orders import machine_of
 from thsa_cosim.diagnosis.choosing.score import held_shapes
+from thsa_cosim.diagnosis.choosing.self_excited import SelfExcited
 from thsa_cosim.diagnosis.choosing.wave_numbers import wave_number_finder
 from thsa_cosim.diagnosis.conclusion import WORK, Conclusion, known_candidates
 from thsa_cosim.diagnosis.fitting.bench import Bench
@@ -126,6 +127,7 @@ def _diagnose(
                 most=spec.most,
                 machine=machine,
                 stuck=in_step.found,
+                continued=SelfExcited(bench, following, say).continued,
                 say=say,
             )
     give_back()  # what the search took

@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis.analytic import bench, candidates, unknowns
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
-from thsa_cosim.diagnosis.choosing.curves import EXPONENTS, along_exponents, nearest
+from thsa_cosim.diagnosis.choosing.curves import EXPONENTS, along_exponents, falls, nearest
 from thsa_cosim.diagnosis.choosing.score import Scored, held_shapes, judge, polish, score
 from thsa_cosim.diagnosis.choosing.screen import propose
 from thsa_cosim.diagnosis.fitting.bench import Bench
@@ -107,3 +107,12 @@ def test_a_fit_that_no_other_exponent_betters_is_kept():
     found = along_exponents(selection, stuck, stuck)  # type: ignore[arg-type]
     again = along_exponents(selection, found, found)  # type: ignore[arg-type]
     assert found.fit.cost - again.fit.cost < 0.1
+
+
+def test_a_stribeck_friction_falls_over_the_speed_and_a_drag_does_not():
+    values = {**CURVE, "motorEffect.hessSoom.dF": 0.6, "motorEffect.hessSoom.v_S": 4.0}
+    assert falls(at_motor("stribeck", "stribeck"), values)
+    assert falls(at_motor("stribeck", "hessSoom"), values)
+    assert not falls(at_motor("stribeck", "stribeck"), {**CURVE, f"{BLOCK}.dF": 0.0})
+    for other in candidates("windage", "asymmetric-friction", "load-dependent-friction"):
+        assert not falls(other, {p.variable: p.typical or 1.0 for p in other.parameters})

@@ -8,7 +8,14 @@ import pytest
 
 from diagnosis.analytic import MOTOR, bench, candidates, unknowns
 from thsa_cosim.diagnosis.fitting import following as room
-from thsa_cosim.diagnosis.fitting.following import MEANS, Followed, Following, driven, find_followed
+from thsa_cosim.diagnosis.fitting.following import (
+    MEANS,
+    Followed,
+    Following,
+    driven,
+    find_followed,
+    without_lag,
+)
 from thsa_cosim.signals import Signals
 
 TRIALS = bench(candidates("windage"), {}).of("fit")
@@ -97,3 +104,69 @@ def test_without_a_speed_that_is_measured_there_is_no_gain():
     with Following(own, [MOTOR], lambda _values: signals(), lambda _: None) as following:  # type: ignore[arg-type,return-value]
         assert following.gain(unknowns(), unknowns().start) is None
     assert room.STEPS[0] == 1.0
+
+
+def behind(lag: float, speed: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """A sensor of first order, whose input is linear between the samples: exact."""
+    shown = np.empty_like(speed)
+    shown[0] = speed[0]
+    for k, (step, before, now) in enumerate(zip(np.diff(time), speed[:-1], speed[1:], strict=True)):
+        slope, decay = (now - before) / step, np.exp(-step / lag)
+        shown[k + 1] = now - slope * lag + (shown[k] - before + slope * lag) * decay
+    return shown
+
+
+def test_a_place_follows_a_signal_behind_a_lag_only_where_that_is_asked_for():
+    late = signals(u=behind(0.02, SPEED, CASE.time))
+    assert find_followed([MOTOR], TRIALS, late) is None
+    found = find_followed([MOTOR], TRIALS, late, lagged=True)
+    assert found is not None
+    assert (found.channel, found.lag) == ("u", pytest.approx(0.02, rel=1e-2))
+    other = signals(u=SPEED**2)
+    assert find_followed([MOTOR], TRIALS, other, lagged=True) is None
+
+
+@pytest.mark.parametrize("mean_of", [1, 2])
+def test_what_a_lagging_sensor_was_shown_comes_back(mean_of: int):
+    raw = np.arange(0.0, 4.0, 1e-3)
+    speed = np.sin(2.0 * np.pi * 3.0 * raw) + 0.3 * np.sin(2.0 * np.pi * 120.0 * raw)
+    shown = behind(0.01, speed, raw)
+    time, means = (x[: raw.size // mean_of * mean_of].reshape(-1, mean_of).mean(axis=1) for x in (raw, shown))
+    found = without_lag(time, means, 0.01, mean_of, raw)
+    inner = (raw > 0.5) & (raw < 3.5)
+    assert np.std(means - np.interp(time, raw, speed)) > 0.2, "the lag takes much of it"
+    assert np.std(found[inner] - speed[inner]) < 0.06
+
+
+def test_a_followed_signal_behind_a_lag_does_not_count_and_the_gain_is_the_one_that_leaves_least(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    own = bench(candidates("windage"), {})
+    late = signals(u=behind(0.02, SPEED, CASE.time))
+    runner = Runner()
+
+    def left(following: Following, gain: float, *_given: Any) -> float:
+        followed = following.followed(unknowns(), unknowns().start)
+        assert followed is not None
+        return abs(np.log10(gain / followed.unit_gain) + 1.0)
+
+    monkeypatch.setattr(Following, "_beside", left)
+    with Following(own, [MOTOR], lambda _values: late, lambda _: runner) as following:  # type: ignore[arg-type,return-value]
+        assert following.gain(unknowns(), unknowns().start) is None, "not without being asked"
+        place = following.of(MOTOR)
+        assert place is following.of(MOTOR)
+        unit = place.followed(unknowns(), unknowns().start)
+        assert unit is not None
+        assert place.gain(unknowns(), unknowns().start) == pytest.approx(0.1 * unit.unit_gain)
+        assert place.beside_signal(1.0).weights == {"u": 0.0}
+        assert place.at(1.0).weights == {}
+        assert following.of(replace(MOTOR, name="elsewhere")).followed(unknowns(), unknowns().start) is None
+    assert runner.closed
+
+
+def test_means_are_undone_with_the_lag():
+    followed = Followed(MOTOR, "u", 1.0, lag=0.02)
+    given = driven(TRIALS[0], followed).case.inputs["motorMeasured"]
+    channel = next(c for c in CASE.channels if c.name == "u")
+    aim = without_lag(channel.time, channel.measured, 0.02, channel.mean_of, CASE.inputs.time)
+    np.testing.assert_array_equal(given, aim)

@@ -27,6 +27,10 @@ from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
 
 #: Objections to what another form, or another effect, takes the place of.
+CONTINUED = (
+    " makes the machine stick and slip: it was fitted with the model kept in step with a measured speed, then to the"
+    " free run from there; the stated errors hold what the fits in step differ by"
+)
 TAKEN = "another form of it fits better"
 APART = "explains the held-out recordings as well, but not the fit recording that distinguishes them"
 
@@ -118,6 +122,11 @@ class Begun:
 #: The weights, the declared model's fit, and its held-out residuals (N,) → what is found at once.
 Begin = Callable[[ChannelWeights, Fit, FloatArray], Begun | None]
 
+#: An accepted effect, the model's fit with it, and its held-out residuals (N,).
+Judged = tuple[Scored, Fit, FloatArray]
+#: The weights, and what was accepted → the same by a better way, and what it went by; None: nothing better.
+Continue = Callable[[ChannelWeights, Judged], tuple[Judged, tuple[Scored, ...]] | None]
+
 
 def attribute(
     bench: Bench,
@@ -132,6 +141,7 @@ def attribute(
     deep: bool = True,
     begin: Begin = lambda _weights, _base, _held: None,
     stuck: Begin = lambda _weights, _base, _held: None,
+    continued: Continue = lambda _weights, _found: None,
     settled: float = 0.0,
     least: float = 0.0,
     say: Say = lambda _: None,
@@ -141,7 +151,8 @@ def attribute(
     ``start``: what the same unknowns were fitted to before, on the same recordings (default: from the drawing).
     ``machine``: whose orders the ripples keep to. ``deep``: further starts, larger sizes, other forms and rivals count.
     ``begin``: what is found in another way first, and gone on from. ``stuck``: what is found in another way where
-    nothing that the first screening leads to leaves nothing; effects that it finds are all that count. ``settled``:
+    nothing that the first screening leads to leaves nothing; effects that it finds are all that count. ``continued``: a
+    better fit of an accepted effect by another way, whose steps count as other forms of it. ``settled``:
     structure, in standard deviations of the noise, which is not looked into any more beside an effect, nor for it
     whether a known order is free. ``least``: share of what is left that an effect has to promise.
     """
@@ -165,6 +176,7 @@ def attribute(
     current, current_held = base, held
     rounds: list[Round] = []
     accepted: list[Scored] = []
+    said: list[str] = []
     begun = begin(weights, base, held)
     if begun is not None:
         rounds, accepted, current, current_held = [*begun.rounds], [*begun.accepted], begun.fit, begun.held
@@ -203,6 +215,11 @@ def attribute(
             current_held = reweighed
             if not settled:
                 choice, fit, current_held = freed(bench, weights, choice, (fit, reweighed), say)
+                better = continued(weights, (choice, fit, current_held))
+                if better is not None:
+                    (choice, fit, current_held), ways = better
+                    rounds[-1] = replace(rounds[-1], forms=ways)
+                    said.append(choice.candidate.name + CONTINUED)
             rounds[-1] = rounds[-1].with_accepted(choice)
             accepted.append(choice)
             current = fit
@@ -228,7 +245,7 @@ def attribute(
         weights.plain(weights.base_held, "validate"),
         weights.plain(current_held, "validate"),
         bench.factors("fit"),
-        (*(begun.notes if begun is not None else ()), *notes),
+        (*(begun.notes if begun is not None else ()), *said, *notes),
     )
 
 

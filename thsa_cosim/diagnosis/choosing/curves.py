@@ -101,14 +101,9 @@ def nearest(
     one, two = candidate.variant.law, like.variant.law
     start = {p.name: values[p.variable] for p in like.parameters if p.variable in values}
     free = [p for p in candidate.parameters if p.name not in held]
-    lengths = [
-        p.typical / q.typical
-        for p, q in zip(candidate.parameters, candidate.variant.parameters, strict=True)
-        if q.dimension == "V" and not p.fixed
-    ]
-    if one is None or two is None or not lengths or any(not start.get(p.name) for p in free):
+    at = _speeds(candidate)
+    if one is None or two is None or at is None or any(not start.get(p.name) for p in free):
         return None
-    at = {"v": lengths[0] * SPEEDS, "s": np.ones(SPEEDS.size)}
     try:
         aim = two(start, at)
         size = np.array([start[p.name] for p in free])
@@ -125,3 +120,25 @@ def nearest(
     return {p.variable: float(x) for p, x in zip(free, found.x * size, strict=True)} | {
         p.variable: held[p.name] for p in candidate.parameters if p.name in held
     }
+
+
+def falls(candidate: Candidate, values: Mapping[str, float]) -> bool:
+    """Whether its law at ``values`` (by variable) falls over the speed alone: a friction that may excite itself."""
+    law, at = candidate.variant.law, _speeds(candidate)
+    if law is None or at is None:
+        return False
+    try:
+        force = np.asarray(law({p.name: values[p.variable] for p in candidate.parameters}, at))
+    except KeyError:  # a law of more than the speed
+        return False
+    return bool(np.all(np.diff(force) <= 0.0) and force[0] > force[-1])
+
+
+def _speeds(candidate: Candidate) -> dict[str, FloatArray] | None:
+    """What the slot of a curve over the speed sees up to its largest speed; None where no speed is a parameter."""
+    lengths = [
+        p.typical / q.typical
+        for p, q in zip(candidate.parameters, candidate.variant.parameters, strict=True)
+        if q.dimension == "V" and not p.fixed
+    ]
+    return {"v": lengths[0] * SPEEDS, "s": np.ones(SPEEDS.size)} if lengths else None

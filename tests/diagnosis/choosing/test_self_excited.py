@@ -1,0 +1,128 @@
+"""A friction that falls over the speed: when it is fitted in step, and what has to come of it."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.analytic import bench, candidates, unknowns
+from thsa_cosim.diagnosis.choosing import self_excited as room
+from thsa_cosim.diagnosis.choosing.attribution import Judged
+from thsa_cosim.diagnosis.choosing.score import held_shapes, polish, score
+from thsa_cosim.diagnosis.choosing.screen import propose
+from thsa_cosim.diagnosis.choosing.self_excited import SHARES, SelfExcited
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import Fit, refine
+from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
+
+BLOCK = "motorEffect.stribeck"
+CURVE = {f"{BLOCK}.dF": 0.6, f"{BLOCK}.v_S": 4.0, f"{BLOCK}.n": 1.0}
+
+
+class Following:
+    """Follows with any gain: the same recordings; notes the gains and which signals counted."""
+
+    def __init__(self, own: Bench, gain: float | None = 10.0) -> None:
+        self.own, self._gain = own, gain
+        self.asked: list[tuple[float, bool]] = []
+
+    def of(self, _slot: object) -> "Following":
+        return self
+
+    def gain(self, *_given: object) -> float | None:
+        return self._gain
+
+    def followed(self, *_given: object) -> SimpleNamespace:
+        return SimpleNamespace(channel="i")
+
+    def at(self, gain: float) -> Bench:
+        self.asked.append((gain, True))
+        return self.own
+
+    def beside_signal(self, gain: float) -> Bench:
+        self.asked.append((gain, False))
+        return self.own
+
+
+def stuck(effect: str = "stribeck", off: float = 1.5) -> tuple[Bench, ChannelWeights, Judged]:
+    """A Stribeck friction whose accepted fit is ``off`` by a factor in its shape, as one that is out of phase is."""
+    one = next(c for c in candidates(effect) if c.slot.name == "motor" and not c.variant.beside)
+    own = bench((one,), CURVE if effect == "stribeck" else {}, 3, held_shapes((one,)))
+    base = refine(own, unknowns(), unknowns().start)
+    assert base is not None
+    (held,) = own.residuals(base.unknowns, base.vector[None, :], "validate")
+    assert held is not None
+    shapes = {p.name: CURVE[p.variable] for p in one.shapes if p.variable in CURVE}
+    (proposal,) = propose(own, base, [(one, shapes)])
+    scored = score(own, base, held, proposal)
+    assert scored is not None
+    scored = polish(own, scored, base, held)
+    vector = scored.fit.vector.copy()
+    vector[-len(one.parameters) :] *= off
+    found = at(own, scored.fit, vector)
+    (left,) = own.residuals(found.unknowns, vector[None, :], "validate")
+    assert left is not None
+    weights = ChannelWeights(own)
+    weights.base_held = held
+    return own, weights, (replace(scored, fit=found), found, left)
+
+
+def at(own: Bench, fit: Fit, vector: np.ndarray) -> Fit:
+    (residual,) = own.residuals(fit.unknowns, vector[None, :], "fit")
+    assert residual is not None
+    prior = fit.unknowns.prior(vector)
+    return replace(fit, vector=vector, residual=residual, cost=float(residual @ residual + prior @ prior))
+
+
+def continued(own: Bench, weights: ChannelWeights, found: Judged, following: Following) -> Any:
+    return SelfExcited(own, following, lambda _: None).continued(weights, found)  # type: ignore[arg-type]
+
+
+def test_a_better_fit_comes_from_step_by_falling_gains_and_says_by_which_ways():
+    own, weights, found = stuck()
+    following = Following(own)
+    made = continued(own, weights, found, following)
+    assert made is not None
+    (choice, fit, held), ways = made
+    assert fit.cost < 0.9 * found[1].cost
+    assert choice.fit is fit
+    assert choice.validate is held
+    values = fit.unknowns.named(fit.vector)
+    assert values[f"{BLOCK}.v_S"] == pytest.approx(4.0, rel=0.15)
+    assert choice.proposal is not found[0].proposal, "a round takes it for a new one"
+    assert [w.fit.unknowns.names for w in ways] == [fit.unknowns.names] * len(SHARES)
+    blind = [gain for gain, counts in following.asked if not counts]
+    counted = [gain for gain, counts in following.asked if counts]
+    assert blind == [share * 10.0 for share in SHARES], "there the followed signal does not count"
+    assert counted == sorted(counted, reverse=True)
+    assert max(counted) < min(blind)
+
+
+def test_what_leaves_only_noise_rises_with_the_speed_or_cannot_follow_stays():
+    own, weights, found = stuck(off=1.0)
+    following = Following(own)
+    assert continued(own, weights, found, following) is None
+    own, weights, found = stuck("windage", off=30.0)
+    assert continued(own, weights, found, following) is None
+    own, weights, found = stuck()
+    assert continued(own, weights, found, Following(own, gain=None)) is None
+    assert not following.asked, "nothing was simulated for it"
+
+
+def test_a_fit_in_step_that_promises_too_little_or_a_free_run_that_is_no_better_counts_for_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    own, weights, found = stuck()
+    before = own.weights
+    following = Following(own)
+    with monkeypatch.context() as patch:
+        patch.setattr(room, "PROMISE", 1.0)
+        assert continued(own, weights, found, following) is None
+        assert len(following.asked) == 1
+    monkeypatch.setattr(room, "released", lambda *_given: found[1])
+    assert continued(own, weights, found, following) is None
+    monkeypatch.setattr(room, "released", lambda *_given: None)
+    assert continued(own, weights, found, following) is None
+    assert own.weights is before

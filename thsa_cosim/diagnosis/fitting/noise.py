@@ -20,6 +20,9 @@ CLOSE = 0.1
 #: It is noise if its response is less than so many times what half the steps change in it. Errors that grow with the
 #: step change by half, others by more.
 CLEAR = 3.0
+#: A step to the drawing counts unless the cost rises by so much, a standard deviation of one unknown: the solver's
+#: errors change it by less, either way.
+RISEN = 1.0
 
 
 def without_noise(bench: Bench, fit: Fit) -> Fit:
@@ -74,9 +77,9 @@ def _combinations(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _moved(bench: Bench, fit: Fit) -> Fit:
-    """``fit`` after the Gauss-Newton step that is left, if that lowers the cost."""
+    """``fit`` after the Gauss-Newton step that is left, unless the cost rises by more than errors of the solver."""
     vector = fit.vector + fit.remaining_step
     (residual,) = bench.residuals(fit.unknowns, vector[None, :], "fit")
-    if residual is None or (cost := cost_of(fit.unknowns, vector, residual)) >= fit.cost:
+    if residual is None or (cost := cost_of(fit.unknowns, vector, residual)) >= fit.cost + RISEN:
         return fit
     return replace(fit, vector=vector, residual=residual, cost=cost)

@@ -15,6 +15,7 @@ from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.extend import write_extended_model
 from thsa_cosim.diagnosis.choosing.attribution import Attribution
+from thsa_cosim.diagnosis.choosing.curves import falls
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
 from thsa_cosim.diagnosis.choosing.findings import (
     found_effects,
@@ -174,6 +175,11 @@ class Conclusion:
             instead=instead,
         )
 
+    def _sticking(self) -> str:
+        """The name of an effect that was found whose law falls over the speed, "" if there is none."""
+        values = self.found.final.unknowns.named(self.found.final.vector)
+        return next((s.candidate.name for s in self.found.accepted if falls(s.candidate, values)), "")
+
     def _coupled(self, model: Identified) -> CouplingError | str:
         """What the communication step of a foreign FMU costs at the fit, on the first fit recording."""
         trial = next(t for t in model.trials if t.part == "fit")
@@ -286,14 +292,17 @@ class Conclusion:
             yield f"{extended.fmu.name} is for {native_platform().fmi3} only; {again} compiles it for all platforms"
 
 
-def note_on_no_law(share: float, *, empirical: bool) -> str:
-    """Why no law is searched in the ``share`` of the declared model's structure that effects leave; "" if one is."""
-    if empirical or share >= WORTH:
+def note_on_no_law(share: float, sticking: str = "", *, empirical: bool) -> str:
+    """Why no law is searched in the ``share`` of the declared model's structure that effects leave; "" if one is.
+
+    ``sticking``: an effect in the model that makes it stick and slip, "" for none.
+    """
+    if empirical or (share >= WORTH and not sticking):
         return ""
-    return (
-        f"no empirical law was searched in the {share:.0%} of the repeatable residual that the effects leave;"
-        " empirical = true in [diagnose] searches one"
-    )
+    what = f"in the {share:.0%} of the repeatable residual that the effects leave"
+    if sticking:
+        what = f"beside {sticking}: a model that sticks and slips at other times than the machine says little of it"
+    return f"no empirical law was searched {what}; empirical = true in [diagnose] searches one"
 
 
 def export_command(model: object, package: object, fmu: object) -> str:

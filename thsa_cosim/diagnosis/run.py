@@ -127,7 +127,7 @@ def _diagnose(
                 most=spec.most,
                 machine=machine,
                 stuck=in_step.found,
-                continued=SelfExcited(bench, following, say).continued,
+                continued=SelfExcited(bench, following, tested.candidates, say).continued,
                 say=say,
             )
     give_back()  # what the search took

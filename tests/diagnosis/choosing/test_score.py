@@ -146,11 +146,13 @@ def test_a_fit_from_another_start_has_every_column_fresh_and_no_score_if_it_fail
     start = np.array([1.5, 8.0])
     given: Any = (bench, choice.proposal, choice.fit, HELD, choice.fit.unknowns, start)
     fits.queue = [fit(2.2, 1.0, 100.0), None]
-    found = refit(*given)
+    steps = np.array([0.1, 0.2])
+    found = refit(*given, steps)
     assert found is not None
     assert (found.fit.vector[0], found.proposal) == (2.2, choice.proposal)
     assert refit(*given) is None
-    assert fits.asked == [((bench, choice.fit.unknowns, start), {"enough": 3.0})] * 2
+    asked = (bench, choice.fit.unknowns, start)
+    assert fits.asked == [(asked, {"steps": known, "enough": 3.0}) for known in (steps, None)]
 
 
 def test_what_is_known_of_an_accepted_effects_shapes_stays_known_in_the_next_round():

@@ -15,7 +15,7 @@ from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue.effect import Connectors, Values
 from thsa_cosim.diagnosis.catalogue.slots import Slot
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, _is_taken, attribute
-from thsa_cosim.diagnosis.choosing.forms import _is_form
+from thsa_cosim.diagnosis.choosing.forms import is_form
 from thsa_cosim.diagnosis.choosing.score import held_shapes
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.choosing.selection import REFINED, worth_refining
@@ -38,7 +38,7 @@ def test_a_term_neither_takes_the_place_of_another_one_nor_is_its_form():
     first, second = CANDIDATES["k_vv"], CANDIDATES["k_Ns"]
     assert _is_taken(first, first)
     assert not _is_taken(second, first)
-    assert not _is_form(second, first)
+    assert not is_form(second, first)
 
 
 def test_several_terms_of_a_place_are_refined():
@@ -48,8 +48,8 @@ def test_several_terms_of_a_place_are_refined():
 
 def test_powers_of_the_speed_are_forms_of_one_term_the_free_exponent_last():
     square, cube = CANDIDATES["k_vv"], CANDIDATES["k_vvv"]
-    assert _is_form(POWER, square)
-    assert _is_form(POWER, cube)
+    assert is_form(POWER, square)
+    assert is_form(POWER, cube)
     assert _is_taken(cube, square)
     assert POWER.coefficients == square.coefficients, "fitted on from the square's optimum"
     assert [p.at_start for p in POWER.shapes] == [2.0]

@@ -14,6 +14,7 @@ from thsa_cosim.diagnosis.fitting.following import (
     Following,
     driven,
     find_followed,
+    with_lag,
     without_lag,
 )
 from thsa_cosim.signals import Signals
@@ -124,6 +125,25 @@ def test_a_place_follows_a_signal_behind_a_lag_only_where_that_is_asked_for():
     assert (found.channel, found.lag) == ("u", pytest.approx(0.02, rel=1e-2))
     other = signals(u=SPEED**2)
     assert find_followed([MOTOR], TRIALS, other, lagged=True) is None
+
+
+def test_a_sensor_that_lags_is_known_where_a_place_sticks_and_slips_between_the_samples():
+    """The integral of what samples show drifts away; what a lag makes of them does not."""
+    fine = np.arange(0.0, CASE.time[-1], 2e-5)
+    phase = 2.0 * np.pi * 0.47 / np.median(np.diff(CASE.time)) * fine
+    slipping = np.sin(fine) + 0.8 * np.sign(np.sin(fine)) * np.maximum(0.0, np.sin(phase + np.sin(fine))) ** 4
+    columns = {"motorEffect.v": slipping, "u": with_lag(fine, slipping, 0.05, 0.0)}
+    at = {name: np.interp(CASE.time, fine, column) for name, column in columns.items()}
+    found = find_followed([MOTOR], TRIALS, signals(**at), lagged=True)
+    assert found is not None
+    assert found.lag == pytest.approx(0.05, rel=0.1)
+
+
+def test_what_a_lag_shows_of_a_step_and_of_a_ramp():
+    time = np.linspace(0.0, 1.0, 401)
+    faded = np.exp(-time / 0.1)
+    np.testing.assert_allclose(with_lag(time, np.ones(401), 0.1, 0.0), 1.0 - faded, atol=1e-12)
+    np.testing.assert_allclose(with_lag(time, time, 0.1, 0.0), time - 0.1 + 0.1 * faded, atol=1e-12)
 
 
 @pytest.mark.parametrize("mean_of", [1, 2])

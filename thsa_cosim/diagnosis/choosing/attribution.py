@@ -15,6 +15,7 @@ from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, thr
 from thsa_cosim.diagnosis.choosing.forms import best_form, rivals_forms
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, SMALLEST_STRUCTURE, out_of_range
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine
+from thsa_cosim.diagnosis.choosing.places import tied_places
 from thsa_cosim.diagnosis.choosing.ripples import freed, leaves_structure, on_orders
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
@@ -26,11 +27,16 @@ from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
 
-#: Objections to what another form, or another effect, takes the place of.
+#: What is noted of an effect that was fitted in step, where that led to a better free run, and where it did not.
 CONTINUED = (
     " makes the machine stick and slip: it was fitted with the model kept in step with a measured speed, then to the"
     " free run from there; the stated errors hold what the fits in step differ by"
 )
+NOT_CONTINUED = (
+    " makes the machine stick and slip, and the model falls out of step with it: fits with it kept in step with a"
+    " measured speed lead to no better free run; the stated errors hold what they differ by"
+)
+#: Objections to what another form, or another effect, takes the place of.
 TAKEN = "another form of it fits better"
 APART = "explains the held-out recordings as well, but not the fit recording that distinguishes them"
 
@@ -124,7 +130,7 @@ Begin = Callable[[ChannelWeights, Fit, FloatArray], Begun | None]
 
 #: An accepted effect, the model's fit with it, and its held-out residuals (N,).
 Judged = tuple[Scored, Fit, FloatArray]
-#: The weights, and what was accepted → the same by a better way, and what it went by; None: nothing better.
+#: The weights, and what was accepted → the same, or better, and what was found on another way; None: no other way.
 Continue = Callable[[ChannelWeights, Judged], tuple[Judged, tuple[Scored, ...]] | None]
 
 
@@ -152,7 +158,7 @@ def attribute(
     ``machine``: whose orders the ripples keep to. ``deep``: further starts, larger sizes, other forms and rivals count.
     ``begin``: what is found in another way first, and gone on from. ``stuck``: what is found in another way where
     nothing that the first screening leads to leaves nothing; effects that it finds are all that count. ``continued``: a
-    better fit of an accepted effect by another way, whose steps count as other forms of it. ``settled``:
+    better fit of an accepted effect, or the same, and other ways to it, which count as forms of it. ``settled``:
     structure, in standard deviations of the noise, which is not looked into any more beside an effect, nor for it
     whether a known order is free. ``least``: share of what is left that an effect has to promise.
     """
@@ -215,11 +221,12 @@ def attribute(
             current_held = reweighed
             if not settled:
                 choice, fit, current_held = freed(bench, weights, choice, (fit, reweighed), say)
-                better = continued(weights, (choice, fit, current_held))
-                if better is not None:
-                    (choice, fit, current_held), ways = better
-                    rounds[-1] = replace(rounds[-1], forms=ways)
-                    said.append(choice.candidate.name + CONTINUED)
+                way = continued(weights, (choice, fit, current_held))
+                if way is not None:
+                    led = way[0][0] is not choice
+                    (choice, fit, current_held), ways = way
+                    rounds[-1] = replace(rounds[-1], forms=ways if led else (*rounds[-1].forms, *ways))
+                    said.append(choice.candidate.name + (CONTINUED if led else NOT_CONTINUED))
             rounds[-1] = rounds[-1].with_accepted(choice)
             accepted.append(choice)
             current = fit
@@ -236,6 +243,7 @@ def attribute(
             return None
         accepted, current, current_held, ended = kept
         notes += ended
+        rounds = _with_places(bench, rounds, accepted, current, current_held, candidates, machine)
     return Attribution(
         base,
         base_cost,
@@ -263,6 +271,30 @@ def _within_range(
             return None
         held = fallen
     return accepted, current, held, notes
+
+
+def _with_places(
+    bench: Bench,
+    rounds: Sequence[Round],
+    accepted: Sequence[Scored],
+    current: Fit,
+    held: FloatArray,
+    candidates: Sequence[Candidate],
+    machine: Machine,
+) -> list[Round]:
+    """``rounds`` with the accepted effects at other shafts among their rivals, where those explain as much."""
+    found = list(rounds)
+    for scored in accepted:
+        k = next(
+            k
+            for k, r in enumerate(found)
+            if r.accepted is not None and r.accepted.proposal is scored.proposal
+        )
+        named = {s.candidate.name for s in (*accepted, *found[k].rivals)}
+        others = [c for c in candidates if c.name not in named]
+        more = tied_places(bench, scored, current, held, others, machine)
+        found[k] = replace(found[k], rivals=(*found[k].rivals, *more))
+    return found
 
 
 def _is_known(candidate: Candidate, fit: Fit) -> bool:

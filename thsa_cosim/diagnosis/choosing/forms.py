@@ -31,7 +31,7 @@ def best_form(
     fitted = [
         s
         for s in (*scored, *selection.fitted(_others(selection, choice, scored, proposals, offered)))
-        if _is_form(s.candidate, choice.candidate)
+        if is_form(s.candidate, choice.candidate)
     ]
     least = RIVAL_SHARE * choice.fit_gain
     near = [s for s in fitted if s.candidate.variant.instead or s.fit_gain >= least]
@@ -63,7 +63,7 @@ def rivals_forms(
             near.setdefault(other.candidate.name, other)
     found = []
     for other in near.values():
-        has_forms = any(c.variant.instead and _is_form(c, other.candidate) for c in offered)
+        has_forms = any(c.variant.instead and is_form(c, other.candidate) for c in offered)
         same = other.candidate.effect.name == choice.candidate.effect.name
         if same or not (has_forms or other.candidate.variant.instead):
             continue
@@ -108,18 +108,18 @@ def _others(
     rows = [
         (candidate, shapes)
         for candidate in offered
-        if candidate.variant.instead and _is_form(candidate, choice.candidate)
+        if candidate.variant.instead and is_form(candidate, choice.candidate)
         for shapes in shape_starts(candidate, {}, {})
     ]
     promised = [*propose(selection.bench, selection.current, rows), *proposals] if rows else proposals
     found: dict[str, Proposal] = {}
     for p in sorted(promised, key=lambda p: -p.gain):
-        if _is_form(p.candidate, choice.candidate) and p.gain >= RIVAL_WORTH * choice.proposal.gain:
+        if is_form(p.candidate, choice.candidate) and p.gain >= RIVAL_WORTH * choice.proposal.gain:
             found.setdefault(p.candidate.key, p)
     return [p for key, p in found.items() if key not in known]
 
 
-def _is_form(candidate: Candidate, other: Candidate) -> bool:
+def is_form(candidate: Candidate, other: Candidate) -> bool:
     """Whether it is the same effect in the same place by another formula; of ripples the order is no formula."""
     waves = any(p.scanned for p in candidate.parameters)
     return (

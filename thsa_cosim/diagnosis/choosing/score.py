@@ -159,10 +159,19 @@ def leaves_little(bench: Bench, fit: Fit) -> bool:
 
 
 def refit(
-    bench: Bench, proposal: Proposal, current: Fit, held: FloatArray, unknowns: Unknowns, vector: FloatArray
+    bench: Bench,
+    proposal: Proposal,
+    current: Fit,
+    held: FloatArray,
+    unknowns: Unknowns,
+    vector: FloatArray,
+    steps: FloatArray | None = None,
 ) -> Scored | None:
-    """A proposal fitted with all parameters from ``vector`` (n,), every Jacobian column fresh; None if it fails."""
-    fit = refine(bench, unknowns, vector, enough=3.0)
+    """A proposal fitted with all parameters from ``vector`` (n,), every Jacobian column fresh; None if it fails.
+
+    ``steps`` (n,): the difference steps to begin with.
+    """
+    fit = refine(bench, unknowns, vector, steps=steps, enough=3.0)
     return None if fit is None else judge(bench, proposal, fit, current, held)
 
 

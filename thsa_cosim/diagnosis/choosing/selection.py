@@ -17,6 +17,7 @@ from thsa_cosim.diagnosis.choosing.gates import (
     out_of_range,
     signal_share,
 )
+from thsa_cosim.diagnosis.choosing.places import shaft_scales
 from thsa_cosim.diagnosis.choosing.score import Scored, go_on, leaves_little, polish, score
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.choosing.sizes import at_sizes, is_led_astray
@@ -103,7 +104,7 @@ def geared(winner: Scored, other: Scored) -> Scored | None:
     if not lengths:
         return None
     ratio = theirs[lengths[0].name].typical / lengths[0].typical
-    shaft = {"V": ratio, "Z": ratio, "D": ratio, "W": 1.0 / ratio, "F": 1.0 / ratio}
+    shaft = shaft_scales(ratio)
     factors = {p.name: p.scale(shaft) for p in two.variant.parameters}
     values = dict(winner.fit.unknowns.named(winner.fit.vector))
     values |= {

@@ -14,6 +14,8 @@ from thsa_cosim.diagnosis.fitting.following import Following
 #: The gains of a continuation, as shares of the one that keeps the model in step. These and the iterations at each were
 #: set while looking at two simulated units with cogging that sticks.
 SHARES, ITERATIONS = (0.3, 0.1, 0.03, 0.01), 3
+#: A fit on the way ends where a step brings less than this share of the squares: it only has to lead to the next one.
+SETTLED = 0.003
 #: It is given up where the misfit grows to so many times the least on the way: the model falls out of step.
 LOST = 2.0
 
@@ -30,7 +32,7 @@ def released(bench: Bench, following: Following, gain: float, fit: Fit) -> Fit |
             steps=fit.steps,
             near=True,
             iterations=ITERATIONS if share else 8,
-            enough=3.0 if share else 1.0,
+            enough=SETTLED * fit.residual.size if share else 1.0,
         )
         if again is None or again.misfit > LOST * least:
             return None

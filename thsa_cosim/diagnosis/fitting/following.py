@@ -20,6 +20,7 @@ from typing import Self
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
+from scipy.signal import lfilter
 
 from thsa_cosim.batch import Experiment, Runner
 from thsa_cosim.diagnosis.catalogue.slots import INJECTED, Slot
@@ -184,8 +185,9 @@ def find_followed(
             apart = max(float(np.max(np.abs(v - run[channel]))) for v, run in zip(speeds, runs, strict=True))
             if apart < SAME * largest:
                 return Followed(slot, channel, load / largest)
-            lag = _lag([(run.time, v, run[channel]) for v, run in zip(speeds, runs, strict=True)])
-            if lagged and lag is not None:
+            shown = [(run.time, v, run[channel]) for v, run in zip(speeds, runs, strict=True)]
+            lag = _lag(shown) if lagged else None
+            if lag is not None:
                 return Followed(slot, channel, load / largest, lag)
     return None
 
@@ -198,7 +200,22 @@ def _lag(runs: Sequence[tuple[FloatArray, FloatArray, FloatArray]]) -> float | N
     if not squares or float(moved @ total) <= 0.0:
         return None
     lag = float(total @ total) / float(moved @ total)
-    return lag if float(np.sum((moved - total / lag) ** 2)) < LAGGED**2 * squares else None
+    # Judged by what a lag shows, not by its integral: that adds up what happens between samples where a place sticks.
+    off = sum(float(np.sum((with_lag(time, v, lag, y[0]) - y) ** 2)) for time, v, y in runs)
+    return lag if off < LAGGED**2 * squares else None
+
+
+def with_lag(time: FloatArray, shown: FloatArray, lag: float, first: float) -> FloatArray:
+    """(n,) what a sensor of first order with time constant ``lag`` [s] shows of ``shown`` (n,), linear in between.
+
+    ``time`` (n,) s, evenly spaced; it begins at ``first``.
+    """
+    step = float(time[-1] - time[0]) / (time.size - 1)
+    decay = np.exp(-step / lag)
+    rise = (1.0 - decay) * lag / step
+    forced = (1.0 - rise) * shown[1:] + (rise - decay) * shown[:-1]
+    after, _ = lfilter([1.0], [1.0, -decay], forced, zi=[decay * first])
+    return np.concatenate([[first], after])
 
 
 def without_lag(time: FloatArray, shown: FloatArray, lag: float, mean_of: int, at: FloatArray) -> FloatArray:

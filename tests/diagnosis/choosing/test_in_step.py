@@ -1,0 +1,93 @@
+"""What is found in step: who joins where the free run is lost without it."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.analytic import bench, candidates, unknowns
+from thsa_cosim.diagnosis.choosing import in_step as room
+from thsa_cosim.diagnosis.choosing.attribution import Begun
+from thsa_cosim.diagnosis.choosing.in_step import FURTHER, LEAST, SHARE, InStep
+from thsa_cosim.diagnosis.choosing.score import held_shapes
+from thsa_cosim.diagnosis.choosing.screen import screen
+from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.fit import refine
+
+
+def screened() -> tuple[Bench, Begun, Any]:
+    """A drive that lacks a drag, what is found of it so far (nothing), and the last screening, with no choice."""
+    offered = candidates("windage", "stribeck")
+    own = bench(offered, {"motorEffect.windage.b_q": 2e-3}, 3, held_shapes(offered))
+    base = refine(own, unknowns(), unknowns().start)
+    assert base is not None
+    (held,) = own.residuals(base.unknowns, base.vector[None, :], "validate")
+    assert held is not None
+    last = SimpleNamespace(accepted=None, proposals=screen(own, base, offered, {}), gains=np.zeros(3))
+    return own, Begun((), (), base, held), SimpleNamespace(rounds=[last], final=base)
+
+
+def further(own: Bench, found: Any, whole: Begun) -> Begun | None:
+    asks: Any = SimpleNamespace(seed=1, say=lambda _: None)
+    return InStep._further(asks, own, found, whole)
+
+
+def test_what_promised_most_but_too_little_joins_in_front_with_its_fit():
+    own, whole, found = screened()
+    made = further(own, found, whole)
+    assert made is not None
+    (one,) = made.accepted
+    assert one.candidate.key == found.rounds[-1].proposals[0].candidate.key
+    assert one.candidate.name == "windage:motor"
+    assert made.rounds[0].accepted is one
+    assert made.fit is one.fit
+    assert made.fit.misfit < 0.5 * whole.fit.misfit
+    assert further(own, found, made) is None, "it is in the model already"
+
+
+def test_nothing_joins_that_promises_too_little_or_where_the_last_screening_had_its_choice():
+    own, whole, found = screened()
+    gain = found.rounds[-1].proposals[0].gain
+    much = SimpleNamespace(rounds=found.rounds, final=SimpleNamespace(misfit=1.01 * gain / FURTHER))
+    assert further(own, much, whole) is None
+    less = SimpleNamespace(rounds=found.rounds, final=SimpleNamespace(misfit=0.99 * gain / FURTHER))
+    assert further(own, less, whole) is not None
+    found.rounds[-1].accepted = object()
+    assert further(own, found, whole) is None
+    assert FURTHER < LEAST
+
+
+@pytest.mark.parametrize("locks", [0, 1, None])
+def test_the_free_run_is_tried_again_with_what_joined(monkeypatch: pytest.MonkeyPatch, locks: int | None):
+    """``locks``: how many effects have to join before the free run does."""
+    ways, freed = [object(), object()], object()
+    joined = {id(ways[0]): ways[1], id(ways[1]): None}
+    tried: list[object] = []
+
+    def let_free(
+        _self: InStep, _stepped: Bench, _gain: float, _weights: Any, whole: object, _left: float
+    ) -> Any:
+        tried.append(whole)
+        return freed if locks is not None and whole is ways[locks] else None
+
+    monkeypatch.setattr(room, "leaves_structure", lambda *_given: True)
+    monkeypatch.setattr(room, "attribute", lambda *_given, **_more: object())
+    monkeypatch.setattr(InStep, "_order", lambda *_given: (12.0, 2.0 * SHARE))
+    monkeypatch.setattr(InStep, "_added", lambda *_given: None)
+    monkeypatch.setattr(InStep, "_whole", lambda *_given: ways[0])
+    monkeypatch.setattr(InStep, "_further", lambda _self, _stepped, _found, whole: joined[id(whole)])
+    monkeypatch.setattr(InStep, "_freed", let_free)
+    following = SimpleNamespace(
+        followed=lambda *_given: SimpleNamespace(slot=SimpleNamespace(is_angular=True), channel="w_m"),
+        gain=lambda *_given: 10.0,
+        at=lambda _gain: SimpleNamespace(weights={}),
+    )
+    asks: Any = InStep(None, following, None, (), None, None, 1, lambda _: None)  # type: ignore[arg-type]
+    weights, base, held = SimpleNamespace(left=lambda _held: 1.0), SimpleNamespace(vector=None), np.zeros(1)
+    made = asks.found(weights, base, held)
+    assert tried == ways[: 2 if locks is None else locks + 1]
+    if locks is None:
+        assert made.accepted == (), "the search goes on from the declared model"
+    else:
+        assert made is freed

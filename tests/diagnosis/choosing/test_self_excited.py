@@ -145,8 +145,10 @@ def test_where_no_free_run_is_better_the_fit_stays_and_its_errors_hold_what_was_
         monkeypatch.setattr(room, "released", lambda *_given, free=free: free)
         made = continued(own, weights, found, Following(own))
         assert made is not None
-        same, ways = made
-        assert same is found
+        (choice, fit, held), ways = made
+        assert (fit, held) == (found[1], found[2])
+        assert (choice.candidate, choice.fit) == (found[0].candidate, found[1])
+        assert choice.proposal is not found[0].proposal, "a round takes it for a new one"
         assert len(ways) == len(SHARES)
         for way in ways:
             values = way.fit.unknowns.named(way.fit.vector)

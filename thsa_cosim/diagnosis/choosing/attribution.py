@@ -223,9 +223,9 @@ def attribute(
                 choice, fit, current_held = freed(bench, weights, choice, (fit, reweighed), say)
                 way = continued(weights, (choice, fit, current_held))
                 if way is not None:
-                    led = way[0][0] is not choice
+                    led = way[0][1] is not fit
                     (choice, fit, current_held), ways = way
-                    rounds[-1] = replace(rounds[-1], forms=ways if led else (*rounds[-1].forms, *ways))
+                    rounds[-1] = replace(rounds[-1], forms=ways)
                     said.append(choice.candidate.name + (CONTINUED if led else NOT_CONTINUED))
             rounds[-1] = rounds[-1].with_accepted(choice)
             accepted.append(choice)

@@ -45,12 +45,12 @@ class SelfExcited:
     say: Say
 
     def continued(self, weights: ChannelWeights, found: Judged) -> tuple[Judged, tuple[Scored, ...]] | None:
-        """The fit that the ones in step lead to, or ``found`` itself where its free run is the better one, and these.
+        """The fit that the ones in step lead to, or that of ``found`` where its free run is the better one, and these.
 
         ``found``: the accepted effect, the model's fit with it and its held-out residuals. None where nothing in step
         promises enough.
         """
-        choice, fit, _held = found
+        choice, fit, held = found
         values = {**choice.fit.unknowns.named(choice.fit.vector), **fit.unknowns.named(fit.vector)}
         left = weights.plain(fit.residual, "fit")
         if float(np.mean(left**2)) < ENOUGH or not falls(choice.candidate, values):
@@ -66,15 +66,17 @@ class SelfExcited:
             return None
         best = stepped[-1]
         self.say(f"letting the model with {best.candidate.name} run freely")
+        # Under the weights that the fits in step have, too: costs are compared.
+        same = replace(choice, proposal=replace(choice.proposal), fit=fit, validate=held), fit, held
         free = released(self.bench, following, SHARES[-1] * gain, best.fit)
         if free is None or free.cost >= fit.cost or out_of_range(free):
-            return found, stepped
+            return same, stepped
         better = replace(best, proposal=replace(best.proposal), fit=free)
         if insignificant(better):
-            return found, stepped
+            return same, stepped
         again, own = weights.weigh(free)
         if own is None:
-            return found, stepped
+            return same, stepped
         return (replace(better, fit=again, validate=own), again, own), stepped
 
     def _in_step(self, following: Following, gain: float, choice: Scored, fit: Fit) -> tuple[Scored, ...]:

@@ -93,7 +93,12 @@ def scored(name: str, number: float, residual: np.ndarray, known: float = 1e12) 
     )
     own = SimpleNamespace(name="k", variable="k", neutral=0.0, fixed=False)
     candidate = SimpleNamespace(
-        name=name, effect=SimpleNamespace(name=name), parameters=(own,), coefficients=(own,)
+        name=name,
+        effect=SimpleNamespace(name=name),
+        parameters=(own,),
+        coefficients=(own,),
+        variant=object(),
+        slot=SimpleNamespace(name="motor", is_angular=True),
     )
     return SimpleNamespace(candidate=candidate, fit=fit, proposal=SimpleNamespace(shapes={}))
 
@@ -273,6 +278,32 @@ def test_a_tie_of_a_later_effect_is_separated_rather_than_the_first_one_sharpene
     assert best.present == pytest.approx(0.25 * best.inputs.time.size), "by the factors of its own round"
     dropped = SimpleNamespace(rounds=rounds, accepted=(first,))
     assert find(monkeypatch, loaded, found=dropped).rivals == ("backlash",)
+
+
+def test_a_tie_between_the_shafts_of_a_gear_is_left_for_one_that_a_profile_may_separate(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    winner, other = (
+        scored("windage:motor", 1.0, np.zeros(TIME.size)),
+        scored("stribeck", 2.0, np.ones(TIME.size)),
+    )
+    twin = scored("windage:gearbox", 1.0, np.zeros(TIME.size))
+    twin.candidate.variant, twin.candidate.slot.name = winner.candidate.variant, "gearbox"
+    later = scored("backlash", 1.0, np.zeros(TIME.size))
+
+    def one(accepted: Any, *rivals: Any) -> SimpleNamespace:
+        return SimpleNamespace(accepted=accepted, scored=(accepted,), rivals=rivals, factors=np.ones(1))
+
+    both = SimpleNamespace(rounds=(one(winner, twin, other),), accepted=(winner,))
+    best = find(monkeypatch, loaded, found=both)
+    assert best.rivals == ("windage:motor", "stribeck")
+    assert best.separates
+    after = SimpleNamespace(rounds=(one(winner, twin), one(later, other)), accepted=(winner, later))
+    assert find(monkeypatch, loaded, found=after).rivals == ("backlash", "stribeck")
+    alone = SimpleNamespace(rounds=(one(winner, twin),), accepted=(winner,))
+    best = find(monkeypatch, loaded, found=alone)
+    assert best.rivals == ("windage:motor", "windage:gearbox")
+    assert not best.separates
 
 
 def test_without_a_tie_the_least_certain_value_is_made_surer(monkeypatch: pytest.MonkeyPatch):

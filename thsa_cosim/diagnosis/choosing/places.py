@@ -26,6 +26,12 @@ def shaft_scales(ratio: float) -> dict[str, float]:
     return {"V": ratio, "Z": ratio, "D": ratio, "W": 1.0 / ratio, "F": 1.0 / ratio}
 
 
+def is_same_law(one: Candidate, other: Candidate) -> bool:
+    """Whether it is the same form of the same effect at another shaft: behind a rigid gear nothing tells them apart."""
+    shafts = one.slot.is_angular and other.slot.is_angular
+    return other.variant is one.variant and other.slot.name != one.slot.name and shafts
+
+
 def tied_places(
     bench: Bench, one: Scored, final: Fit, held: FloatArray, candidates: Sequence[Candidate], machine: Machine
 ) -> list[Scored]:
@@ -37,8 +43,8 @@ def tied_places(
     ratios = machine.turns.get(own.slot.name, {})
     found = []
     for other in candidates:
-        same = other.variant is own.variant and other.slot.name != own.slot.name
-        if not same or other.slot.name not in ratios or any(p.fixed for p in own.parameters):
+        turns = other.slot.name in ratios and is_same_law(own, other)
+        if not turns or any(p.fixed for p in own.parameters):
             continue
         shaft = shaft_scales(ratios[other.slot.name])
         moved, there = at_shaft(one, other, shaft, one.fit), at_shaft(one, other, shaft, final)

@@ -13,6 +13,7 @@ import numpy as np
 from thsa_cosim.batch import Experiment, Job, Runner, Status
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS
+from thsa_cosim.diagnosis.choosing.places import is_same_law
 from thsa_cosim.diagnosis.choosing.score import Scored, fixed_shapes
 from thsa_cosim.diagnosis.choosing.selection import APART_SHARE
 from thsa_cosim.diagnosis.choosing.verdict import SIGNIFICANT, VISIBLE, is_visible
@@ -56,16 +57,17 @@ def separating_experiment(
     ``trials`` run the model that holds all effects. With a tie it is the one at which the accepted effect and its
     rivals differ most once each rival is fitted to it; without one, that which makes the least certain value of the
     first effect surest: its ``stated`` standard error (by name, in its unit) times what the profile is expected to make
-    of it. The other inputs are held at what they were in the first fit recording. None without an
-    accepted effect, a command, or a profile that keeps the limits.
+    of it. A tie between two shafts of a rigid gear counts only where there is no other. The other inputs are held at
+    what they were in the first fit recording. None without an accepted effect, a command, or a profile that keeps the
+    limits.
     """
     fit = [t for t in trials if t.part == "fit"]
     kept = [r for r in found.rounds if r.accepted is not None and r.accepted in found.accepted]
     if spec.command is None or not fit or not kept:
         return None
-    one = next((r for r in kept if r.rivals), kept[0])
+    one, rivals = _to_separate(kept)
     assert one.accepted is not None
-    models = (one.accepted, *one.rivals[:MOST_RIVALS])
+    models = (one.accepted, *rivals[:MOST_RIVALS])
     menu = _menu(spec, fit)
     if not menu:
         return None
@@ -73,6 +75,18 @@ def separating_experiment(
     # One set of processes for all of it: opening them for every profile took longer than the runs.
     with open_runner(scenario.simulation, experiments) as runner:
         return _Plan(spec, fit, one, models, stated, menu, runner).best()
+
+
+def _to_separate(kept: Sequence[Round]) -> tuple[Round, Sequence[Scored]]:
+    """The first round with rivals that a profile may distinguish, and these; else the first with any, or the first."""
+    for one in kept:
+        accepted = one.accepted
+        assert accepted is not None
+        told = [r for r in one.rivals if not is_same_law(accepted.candidate, r.candidate)]
+        if told:
+            return one, told
+    one = next((r for r in kept if r.rivals), kept[0])
+    return one, one.rivals
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,7 +62,6 @@ def test_nothing_joins_that_promises_too_little_or_where_the_last_screening_had_
 def test_the_free_run_is_tried_again_with_what_joined(monkeypatch: pytest.MonkeyPatch, locks: int | None):
     """``locks``: how many effects have to join before the free run does."""
     ways, freed = [object(), object()], object()
-    joined = {id(ways[0]): ways[1], id(ways[1]): None}
     tried: list[object] = []
 
     def let_free(
@@ -76,7 +75,7 @@ def test_the_free_run_is_tried_again_with_what_joined(monkeypatch: pytest.Monkey
     monkeypatch.setattr(InStep, "_order", lambda *_given: (12.0, 2.0 * SHARE))
     monkeypatch.setattr(InStep, "_added", lambda *_given: None)
     monkeypatch.setattr(InStep, "_whole", lambda *_given: ways[0])
-    monkeypatch.setattr(InStep, "_further", lambda _self, _stepped, _found, whole: joined[id(whole)])
+    monkeypatch.setattr(InStep, "_further", lambda *_given: ways[1])
     monkeypatch.setattr(InStep, "_freed", let_free)
     following = SimpleNamespace(
         followed=lambda *_given: SimpleNamespace(slot=SimpleNamespace(is_angular=True), channel="w_m"),

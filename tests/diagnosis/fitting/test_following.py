@@ -125,6 +125,11 @@ def test_a_place_follows_a_signal_behind_a_lag_only_where_that_is_asked_for():
     assert (found.channel, found.lag) == ("u", pytest.approx(0.02, rel=1e-2))
     other = signals(u=SPEED**2)
     assert find_followed([MOTOR], TRIALS, other, lagged=True) is None
+    position = 1e-3 * np.cumsum(SPEED) * np.median(np.diff(CASE.time))
+    assert find_followed([MOTOR], TRIALS, signals(u=position), lagged=True) is None, "behind an endless lag"
+    both = find_followed([MOTOR], TRIALS, signals(i=behind(0.02, SPEED, CASE.time), u=SPEED), lagged=True)
+    assert both is not None
+    assert (both.channel, both.lag) == ("u", 0.0), "what shows it by itself comes first, in whatever order"
 
 
 def test_a_sensor_that_lags_is_known_where_a_place_sticks_and_slips_between_the_samples():

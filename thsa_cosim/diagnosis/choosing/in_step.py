@@ -129,13 +129,11 @@ class InStep:
         if found is None:
             return otherwise
         left = min(weights.left(h) for h in (held, *(s.validate for s in otherwise.tried)))
-        whole: Begun | None = self._whole(stepped, followed, gain, found)
-        while whole is not None:
-            begun = self._freed(stepped, gain, weights, whole, left)
-            if begun is not None:
-                return begun
-            whole = self._further(stepped, found, whole)
-        return otherwise
+        whole = self._whole(stepped, followed, gain, found)
+        begun = self._freed(stepped, gain, weights, whole, left)
+        if begun is None and (more := self._further(stepped, found, whole)) is not None:
+            begun = self._freed(stepped, gain, weights, more, left)
+        return otherwise if begun is None else begun
 
     def _freed(
         self, stepped: Bench, gain: float, weights: ChannelWeights, whole: Begun, left: float
@@ -158,9 +156,9 @@ class InStep:
         """``whole`` with what promised most, but too little, in the last screening in step; None: no such effect."""
         last = found.rounds[-1]
         least = max(threshold(last.gains), FURTHER * found.final.misfit)
-        known = {s.candidate.key for s in whole.accepted}
+        known = {s.candidate.name for s in whole.accepted}
         best = next((p for p in last.proposals if not p.candidate.variant.beside), None)
-        if last.accepted is not None or best is None or best.gain < least or best.candidate.key in known:
+        if last.accepted is not None or best is None or best.gain < least or best.candidate.name in known:
             return None
         proposals = propose(stepped, whole.fit, [(best.candidate, best.shapes)])
         if not proposals:

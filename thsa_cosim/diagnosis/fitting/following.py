@@ -40,6 +40,8 @@ STEPS = tuple(float(g) for g in 10.0 ** np.arange(0.0, 4.5, 0.5))
 IN_STEP = 1.05
 #: A signal is a place's speed behind a lag if that explains it but for this share of its rms.
 LAGGED = 0.05
+#: A lag longer than this share of a recording shows no speed: a position would be one behind an endless lag.
+SLOW = 0.1
 #: Gains tried behind a lag, in the same unit, of which the one counts that leaves least: more of it follows the noise.
 #: Set while looking at two simulated units with a Stribeck friction that sticks and slips.
 LAGGED_STEPS = tuple(float(g) for g in 10.0 ** np.arange(-2.0, 0.5, 0.5))
@@ -181,12 +183,13 @@ def find_followed(
         speeds = [run[f"{slot.component}.v"] for run in runs]
         largest = max(float(np.max(np.abs(speed))) for speed in speeds)
         load = float(np.sqrt(np.mean(np.concatenate([run[f"{slot.component}.N"] for run in runs]) ** 2)))
-        for channel in (c.name for c in trials[0].case.channels if load > 0.0):
+        channels = [c.name for c in trials[0].case.channels if load > 0.0]
+        for channel in channels:
             apart = max(float(np.max(np.abs(v - run[channel]))) for v, run in zip(speeds, runs, strict=True))
             if apart < SAME * largest:
                 return Followed(slot, channel, load / largest)
-            shown = [(run.time, v, run[channel]) for v, run in zip(speeds, runs, strict=True)]
-            lag = _lag(shown) if lagged else None
+        for channel in channels if lagged else ():
+            lag = _lag([(run.time, v, run[channel]) for v, run in zip(speeds, runs, strict=True)])
             if lag is not None:
                 return Followed(slot, channel, load / largest, lag)
     return None
@@ -200,6 +203,8 @@ def _lag(runs: Sequence[tuple[FloatArray, FloatArray, FloatArray]]) -> float | N
     if not squares or float(moved @ total) <= 0.0:
         return None
     lag = float(total @ total) / float(moved @ total)
+    if lag > SLOW * max(float(time[-1] - time[0]) for time, _, _ in runs):
+        return None
     # Judged by what a lag shows, not by its integral: that adds up what happens between samples where a place sticks.
     off = sum(float(np.sum((with_lag(time, v, lag, y[0]) - y) ** 2)) for time, v, y in runs)
     return lag if off < LAGGED**2 * squares else None

@@ -48,7 +48,7 @@ def tied_places(
             continue
         shaft = shaft_scales(ratios[other.slot.name])
         moved, there = at_shaft(one, other, shaft, one.fit), at_shaft(one, other, shaft, final)
-        if moved is not None and there is not None and _explains(bench, there, final, held, other):
+        if moved is not None and there is not None and _explains(bench, there, final, held):
             found.append(moved)
     return found
 
@@ -72,7 +72,7 @@ def at_shaft(one: Scored, other: Candidate, shaft: dict[str, float], fit: Fit) -
     return replace(one, proposal=replace(one.proposal, candidate=other, shapes=shapes), fit=moved)
 
 
-def _explains(bench: Bench, there: Scored, final: Fit, held: FloatArray, other: Candidate) -> bool:
+def _explains(bench: Bench, there: Scored, final: Fit, held: FloatArray) -> bool:
     """Whether the model with the effect ``there`` fits as well as the ``final`` one, the held-out recordings too."""
     unknowns = there.fit.unknowns
     fit = refine(
@@ -80,7 +80,7 @@ def _explains(bench: Bench, there: Scored, final: Fit, held: FloatArray, other: 
         unknowns,
         there.fit.vector,
         jacobian=there.fit.jacobian,
-        fresh=unknowns.index([p.variable for p in other.parameters]),
+        fresh=unknowns.index([p.variable for p in there.candidate.parameters]),
         near=True,
         iterations=2,
         enough=3.0,

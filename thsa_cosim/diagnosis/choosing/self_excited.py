@@ -82,7 +82,7 @@ class SelfExcited:
     def _in_step(self, following: Following, gain: float, choice: Scored, fit: Fit) -> tuple[Scored, ...]:
         """The best form of ``choice``, fitted in step by falling gains, each from the one before.
 
-        None where the first of them promises too little.
+        Nothing where the first of them promises too little.
         """
         tried: list[Scored] = []
         first = following.beside_signal(SHARES[0] * gain)
@@ -91,7 +91,8 @@ class SelfExcited:
             (residual,) = first.residuals(unknowns, vector[None, :], "fit")
             if residual is None:
                 continue
-            before = min(before, cost_of(unknowns, vector, residual)) if one is choice else before
+            if one is choice:
+                before = cost_of(unknowns, vector, residual)
             again = refine(
                 first, unknowns, vector, residual=residual, steps=steps, iterations=ITERATIONS, enough=3.0
             )

@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 
 from diagnosis.analytic import bench, candidates, unknowns
-from thsa_cosim.diagnosis.choosing import attribution as room
-from thsa_cosim.diagnosis.choosing.attribution import Attribution, Begun, attribute, prune
+from thsa_cosim.diagnosis.choosing import attribution
+from thsa_cosim.diagnosis.choosing import needless as room
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, Begun, attribute
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged
 from thsa_cosim.diagnosis.choosing.gates import out_of_range
+from thsa_cosim.diagnosis.choosing.needless import prune, within_range
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, score
 from thsa_cosim.diagnosis.choosing.screen import screen
+from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE
 from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 
@@ -366,7 +369,7 @@ def test_an_earlier_effect_that_a_later_one_makes_needless_is_dropped():
     kept, fit, _, notes = prune(own, declared, weights, accepted, final, held)
     assert [s.candidate.name for s in kept] == ["stribeck:motor"]
     assert "motorEffect.windage.b_q" not in fit.unknowns.names
-    assert notes == ["windage:motor was dropped: the effects found after it explain the same"]
+    assert notes == ["windage:motor was dropped: the other effects explain the same"]
 
 
 def test_all_that_became_needless_is_dropped_and_the_last_one_stays():
@@ -385,7 +388,7 @@ def test_a_needless_one_behind_a_needed_one_is_dropped_alone():
     )
     kept, _, _, notes = prune(own, declared, weights, accepted, final, held)
     assert [s.candidate.name for s in kept] == ["windage:motor", "stribeck:motor"]
-    assert notes == ["asymmetric-friction:motor was dropped: the effects found after it explain the same"]
+    assert notes == ["asymmetric-friction:motor was dropped: the other effects explain the same"]
 
 
 def test_what_cannot_be_fitted_without_an_effect_keeps_it():
@@ -406,6 +409,37 @@ def test_effects_that_are_both_needed_stay():
     assert kept == accepted
     assert fit is final
     assert notes == []
+
+
+def test_an_effect_without_which_a_declared_parameter_ends_at_its_range_stays(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Else the later one, which then drives that parameter, would be dropped as well, and nothing be left of both."""
+    own, declared, weights, accepted, final, held = accepted_by_hand(
+        STRIBECK, "windage:motor", "stribeck:motor"
+    )
+    needed = "motorEffect.windage.b_q"
+    monkeypatch.setattr(room, "out_of_range", lambda fit: "" if needed in fit.unknowns.names else "c")
+    kept, fit, _, notes = prune(own, declared, weights, accepted, final, held)
+    assert (kept, notes) == (accepted, [])
+    assert fit is final
+
+
+def test_what_was_fitted_beside_an_effect_that_was_dropped_since_is_fitted_again(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """An effect's own fit holds those before it: it is no model of the ones that are left."""
+    own, declared, _, accepted, final, held = accepted_by_hand(
+        STRIBECK, "windage:motor", "asymmetric-friction:motor", "stribeck:motor"
+    )
+    last = "motorEffect.stribeck.dF"
+    monkeypatch.setattr(room, "out_of_range", lambda fit: "c" if last in fit.unknowns.names else "")
+    kept = within_range(own, declared, accepted[1:], final, final, held)
+    assert kept is not None
+    assert [s.candidate.name for s in kept[0]] == ["asymmetric-friction:motor"]
+    assert set(kept[1].unknowns.names) == set(extended_unknowns(declared, kept[0]).names)
+    (left,) = own.residuals(kept[1].unknowns, kept[1].vector[None, :], "validate")
+    np.testing.assert_allclose(kept[2], left)
 
 
 @pytest.mark.parametrize(("share", "stays"), [(0.009, False), (0.011, True)])
@@ -433,6 +467,17 @@ def test_an_effect_whose_loss_would_be_visible_stays_however_little_it_is_beside
     monkeypatch.setattr(room, "block_gains", lambda *_: np.full(10, 1.0))
     kept, *_ = prune(own, declared, weights, accepted, final, held, visible)
     assert (len(kept) == 2) is stays
+
+
+def test_an_attribution_keeps_what_the_verdict_would_see(monkeypatch: pytest.MonkeyPatch):
+    asked: list[float] = []
+    monkeypatch.setattr(
+        attribution,
+        "prune",
+        lambda *given: asked.append(given[6]) or (*given[3:6], []),  # type: ignore[func-returns-value]
+    )
+    assert len(diagnosed({**STRIBECK, **WINDAGE}, "windage", "stribeck").accepted) == 2
+    assert asked == [VISIBLE_BESIDE]
 
 
 RIPPLE = {

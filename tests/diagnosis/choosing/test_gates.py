@@ -53,6 +53,7 @@ def test_what_is_small_beside_the_first_effect_must_leave_nothing_to_be_seen():
     assert objection(small, LIMIT, False) == ""
     assert objection(replace(small, share=0.899), LIMIT, False) == says
     assert objection(replace(small, visible=True), LIMIT, False) == says
+    assert objection(replace(small, was_visible=False), LIMIT, False) == says
 
 
 def test_a_further_effect_has_to_explain_more():

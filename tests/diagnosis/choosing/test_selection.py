@@ -248,7 +248,7 @@ def test_what_is_seen_beside_an_effect_is_part_of_its_evidence(selection: Select
         one = scored("a", left)
         one.consistency, one.share = 5.0, 1.0 - left**2
         found = selection.evidence(one)
-        assert found.visible is visible
+        assert (found.visible, found.was_visible) == (visible, True)
         assert found.signal_share == pytest.approx(1.0 - left**2, abs=0.01)
         assert (found.left, found.consistency, found.share) == (1.0, 5.0, one.share)
 

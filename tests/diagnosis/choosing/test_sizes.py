@@ -9,7 +9,7 @@ import pytest
 
 from diagnosis.analytic import bench, candidates, unknowns
 from thsa_cosim.diagnosis.choosing import sizes
-from thsa_cosim.diagnosis.choosing.attribution import prune
+from thsa_cosim.diagnosis.choosing.needless import prune
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
 from thsa_cosim.diagnosis.choosing.sizes import FITTED, SIZES, _rows, _tried, at_sizes, is_led_astray
 from thsa_cosim.diagnosis.fitting.bench import Bench

@@ -182,7 +182,7 @@ def test_an_effect_that_a_law_makes_needless_is_dropped():
     assert law.effects == ()
     assert [s.candidate.name for s in law.terms.accepted] == ["stribeck:motor"]
     assert "motorEffect.windage.b_q" not in law.terms.final.unknowns.names
-    assert law.terms.notes == ("windage:motor was dropped: the effects found after it explain the same",)
+    assert law.terms.notes == ("windage:motor was dropped: the other effects explain the same",)
     np.testing.assert_allclose(np.mean(law.terms.final_validate**2), 1.0, atol=0.1)
 
 

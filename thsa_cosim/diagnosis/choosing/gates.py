@@ -20,7 +20,7 @@ SIGMAS = 3.0
 #: The share of the structure left that a first and a further effect must explain on the held-out recordings.
 FIRST_SHARE, NEXT_SHARE = 0.15, 0.2
 #: A further effect must explain this share of what the declared model left in some channel, or it may be the misfit of
-#: the first one; or else nearly all that is left, so that nothing is visible any more: a misfit has not its form.
+#: the first one; or else nearly all that is left, so that what was visible is no more: a misfit has not its form.
 TOTAL_SHARE, NEARLY_ALL = 0.1, 0.9
 #: Structure below this many standard deviations of the noise (rms over all channels) is not worth an effect.
 SMALLEST_STRUCTURE = 0.08
@@ -34,7 +34,8 @@ class Evidence:
 
     ``left``: mean squared structure of the held-out residuals without it, in variances of the noise. ``share``: how
     much of that it explains; ``signal_share``: of what the declared model left in the signal that gains most.
-    ``visible``: whether a model with it leaves structure that is to be seen in some signal.
+    ``visible``, ``was_visible``: whether a model with it, and one without it, leaves structure that is to be seen in
+    some signal.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Evidence:
     share: float
     signal_share: float
     visible: bool = True
+    was_visible: bool = True
 
 
 def objection(evidence: Evidence, limit: float, first: bool) -> str:
@@ -58,7 +60,7 @@ def objection(evidence: Evidence, limit: float, first: bool) -> str:
         return "what is left is too small against the noise to be worth an effect"
     if evidence.share < wanted:
         return f"{name} explains {100 * evidence.share:.0f} % of what is left, less than {100 * wanted:.0f} %"
-    explains_all = evidence.share >= NEARLY_ALL and not evidence.visible
+    explains_all = evidence.share >= NEARLY_ALL and evidence.was_visible and not evidence.visible
     if evidence.signal_share < TOTAL_SHARE and not explains_all:
         return f"{name} explains less than {100 * TOTAL_SHARE:.0f} % of what the declared model left in any signal"
     return ""

@@ -231,7 +231,14 @@ class Selection:
             left=self.weights.left(self.held),
             share=one.share,
             signal_share=signal_share(trials, base, self.held, one.validate),
-            visible=is_visible(errors(trials, self.weights.plain(one.validate, "validate")), VISIBLE_BESIDE),
+            visible=self._is_visible(one.validate),
+            was_visible=self._is_visible(self.held),
+        )
+
+    def _is_visible(self, held: FloatArray) -> bool:
+        """Whether held-out residuals (N,) hold structure that is to be seen in a model with effects."""
+        return is_visible(
+            errors(self.bench.of("validate"), self.weights.plain(held, "validate")), VISIBLE_BESIDE
         )
 
     def choose(

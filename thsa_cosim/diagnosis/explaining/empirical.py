@@ -24,8 +24,9 @@ from thsa_cosim.diagnosis.catalogue.extend import (
 )
 from thsa_cosim.diagnosis.catalogue.slots import find_slots
 from thsa_cosim.diagnosis.catalogue.superset import scales_of, slot_signals
-from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute, prune
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import values_of
+from thsa_cosim.diagnosis.choosing.needless import prune
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes, held_shapes
 from thsa_cosim.diagnosis.choosing.selection import Say

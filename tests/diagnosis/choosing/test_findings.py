@@ -275,7 +275,7 @@ def test_a_value_at_its_bound_unseen_or_only_known_from_the_drawing_is_not_deter
     assert undetermined(own, 2.0, 7e-7) == "it ended at the end of its range, 2 N"
     assert undetermined(own, -9.0, 7e-7) == "it ended at the end of its range, -9 N"
     assert undetermined(replace(own, unit="1"), 2.0, 7e-7) == "it ended at the end of its range, 2"
-    assert undetermined(own, 1.0, np.inf) == "nothing in the recordings depends on it"
+    assert undetermined(own, 1.0, np.inf) == "nothing in the recordings determines it"
     assert undetermined(own, 1.0, 0.47) == ""
     assert undetermined(own, 1.0, NO_MORE * 0.5) == ""
     assert undetermined(own, 1.0, 0.48) == "the recordings say no more of it than the drawing"

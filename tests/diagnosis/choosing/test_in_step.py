@@ -10,10 +10,12 @@ from diagnosis.analytic import bench, candidates, unknowns
 from thsa_cosim.diagnosis.choosing import in_step as room
 from thsa_cosim.diagnosis.choosing.attribution import Begun
 from thsa_cosim.diagnosis.choosing.in_step import FURTHER, LEAST, SHARE, InStep
+from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE
 from thsa_cosim.diagnosis.choosing.score import held_shapes
 from thsa_cosim.diagnosis.choosing.screen import screen
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import refine
+from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 
 
 def screened() -> tuple[Bench, Begun, Any]:
@@ -56,6 +58,27 @@ def test_nothing_joins_that_promises_too_little_or_where_the_last_screening_had_
     found.rounds[-1].accepted = object()
     assert further(own, found, whole) is None
     assert FURTHER < LEAST
+
+
+@pytest.mark.parametrize(("before", "after"), [(12.0, 17.0), (17.0, 12.0)])
+def test_the_order_that_showed_before_the_declared_parameters_were_fitted_in_step_is_tried_too(
+    monkeypatch: pytest.MonkeyPatch, before: float, after: float
+):
+    """What they have taken up of a ripple leaves another order of it in the force."""
+    offered = candidates("cogging")
+    true = {"motorEffect.cogging.a_s": 0.25, "motorEffect.cogging.n": 12.0}
+    own = bench(offered, true, 3, held_shapes(offered))
+    base = refine(own, unknowns(), unknowns().start)
+    assert base is not None
+    weights = ChannelWeights(own)
+    base, held = weights.weigh(base)
+    assert held is not None
+    asks: Any = InStep(own, None, unknowns(), offered, None, NO_MACHINE, 1, lambda _: None)  # type: ignore[arg-type]
+    monkeypatch.setattr(InStep, "_order", lambda *_given: (after, 0.5))
+    followed: Any = SimpleNamespace(slot=offered[0].slot)
+    made = asks._ripple(own, followed, 1.0, before, weights, base, held)
+    assert made is not None
+    assert made.accepted[0].proposal.shapes["n"] == 12.0
 
 
 @pytest.mark.parametrize("locks", [0, 1, None])

@@ -41,7 +41,7 @@ def undetermined(unknown: Unknown, value: float, stderr: float) -> str:
         unit = "" if unknown.unit in ("", "1") else f" {unknown.unit}"
         return f"it ended at the end of its range, {value:.6g}{unit}"
     if not np.isfinite(stderr):
-        return "nothing in the recordings depends on it"
+        return "nothing in the recordings determines it"
     if unknown.declared and stderr > NO_MORE * unknown.spread:
         return "the recordings say no more of it than the drawing"
     return ""

@@ -104,7 +104,7 @@ class InStep:
         order, share = self._order(followed, gain, base)
         if share < SHARE:
             return None
-        freely = self._added(self.bench, followed, order, base, held)
+        freely = self._added(self.bench, followed, (order,), base, held)
         one = None if freely is None else freely.accepted
         # In the first round it stands beside what the screening finds, whose starts may have led elsewhere.
         otherwise = Begun((), (), base, held, tried=() if one is None else (one,))
@@ -121,7 +121,7 @@ class InStep:
             seed=self.seed,
             machine=self.machine,
             deep=False,
-            begin=lambda w, b, h: self._ripple(stepped, followed, gain, w, b, h),
+            begin=lambda w, b, h: self._ripple(stepped, followed, gain, order, w, b, h),
             settled=SETTLED,
             least=LEAST,
             say=self.say,
@@ -199,13 +199,17 @@ class InStep:
         stepped: Bench,
         followed: Followed,
         gain: float,
+        before: float,
         weights: ChannelWeights,
         base: Fit,
         held: FloatArray,
     ) -> Begun | None:
-        """The ripple at the followed place whose order the force shows, if nothing outweighs it."""
+        """The ripple at the followed place whose order the force shows, if nothing outweighs it.
+
+        ``before``: the order that it showed before the declared parameters were fitted in step, which may take it up.
+        """
         order, _share = self._order(followed, gain, base)
-        made = self._added(stepped, followed, order, base, held)
+        made = self._added(stepped, followed, (order, before), base, held)
         if made is None or (one := made.accepted) is None:
             return None
         if min(one.fit_gain, one.held_out_gain) < made.threshold or one.consistency < SIGMAS:
@@ -222,7 +226,7 @@ class InStep:
         held = found.final_validate * stepped.factors("validate")
         order, _share = self._order(followed, gain, fit)
         for harmonic in (False, True):
-            made = self._added(stepped, followed, order, fit, held, harmonic)
+            made = self._added(stepped, followed, (order,), fit, held, harmonic)
             if made is not None and (one := made.accepted) is not None:
                 rounds, accepted, fit, held = (*rounds, made), (*accepted, one), one.fit, one.validate
         return Begun(rounds, accepted, fit, held)
@@ -231,12 +235,15 @@ class InStep:
         self,
         stepped: Bench,
         followed: Followed,
-        order: float,
+        orders: Sequence[float],
         fit: Fit,
         held: FloatArray,
         harmonic: bool = False,
     ) -> Round | None:
-        """A ripple of the followed place beside ``fit``, or the ``harmonic`` of the one that it has, as a round."""
+        """A ripple of the followed place beside ``fit``, or the ``harmonic`` of the one that it has, as a round.
+
+        Of several ``orders`` the one that promises most.
+        """
         known = fit.unknowns.named(fit.vector)
         rows = []
         for candidate in (c for c in self.candidates if c.slot.name == followed.slot.name):
@@ -245,7 +252,10 @@ class InStep:
             is_harmonic = candidate.variant.beside and all(p.variable in known for p in waves)
             plain = not candidate.variant.beside and not candidate.variant.instead
             if waves and is_new and (is_harmonic if harmonic else plain):
-                rows.append((candidate, {p.name: known.get(p.variable, order) for p in waves}))
+                starts = [
+                    {p.name: known.get(p.variable, order) for p in waves} for order in dict.fromkeys(orders)
+                ]
+                rows += [(candidate, shapes) for shapes in starts]
         proposals = on_orders(propose(stepped, fit, rows), self.machine, fit)
         if not proposals:
             return None

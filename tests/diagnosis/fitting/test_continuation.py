@@ -13,56 +13,43 @@ GAIN = 10.0
 
 
 class Ladder:
-    """Fits that stay in step as long as the gain falls to no less than ``reach`` of the last one's, or from ``low``."""
+    """Fits that stay in step as long as the gain falls to no less than ``reach`` of the last one's, or from ``low``.
+
+    The vector of a fit is the share of the gain that it stays in step with.
+    """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, reach: float, low: float = 0.005) -> None:
         self.reach, self.low = reach, low
         self.shares: list[float] = []
-        self.following: Any = SimpleNamespace(at=lambda gain: gain / GAIN)
-        self.free: Any = 0.0
         monkeypatch.setattr(room, "refine", self.refine)
 
-    def fit(self, share: float, misfit: float = 100.0) -> Any:
-        return SimpleNamespace(
-            share=share,
-            misfit=misfit,
-            unknowns=None,
-            vector=None,
-            jacobian=None,
-            steps=None,
-            residual=np.zeros(100),
-        )
+    def refine(self, share: float, _unknowns: Any, last: float, **_more: Any) -> Any:
+        self.shares.append(share)
+        in_step = last == 1.0 or share >= self.reach * last or last <= self.low
+        return fitted(share, 100.0 if in_step else 1000.0)
 
-    def refine(self, bench: float, *_given: Any, **_more: Any) -> Any:
-        self.shares.append(bench)
-        last = self.at.share
-        in_step = last == 1.0 or bench >= self.reach * last or last <= self.low
-        return self.fit(bench, 100.0 if in_step else 1000.0)
+    def released(self) -> Any:
+        following: Any = SimpleNamespace(at=lambda gain: gain / GAIN)
+        free: Any = 0.0
+        return released(free, following, GAIN, fitted(1.0))
 
-    def released(self, monkeypatch: pytest.MonkeyPatch) -> Any:
-        self.at = self.fit(1.0)
-        plain = self.refine
 
-        def follows(*given: Any, **more: Any) -> Any:
-            made = plain(*given, **more)
-            self.at = made if made.misfit == 100.0 else self.at
-            return made
-
-        monkeypatch.setattr(room, "refine", follows)
-        return released(self.free, self.following, GAIN, self.at)
+def fitted(share: float, misfit: float = 100.0) -> Any:
+    rest = dict.fromkeys(("unknowns", "jacobian", "steps"))
+    return SimpleNamespace(vector=share, misfit=misfit, residual=np.zeros(100), **rest)
 
 
 def test_the_gains_of_the_ladder_are_enough_where_the_model_stays_in_step(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     ladder = Ladder(monkeypatch, 0.1, 0.01)
-    assert ladder.released(monkeypatch).share == 0.0
+    assert ladder.released().vector == 0.0
     assert ladder.shares == pytest.approx([*SHARES, 0.0])
 
 
 def test_a_gain_between_two_keeps_the_model_in_step(monkeypatch: pytest.MonkeyPatch) -> None:
     ladder = Ladder(monkeypatch, 0.35, 0.01)
-    assert ladder.released(monkeypatch).share == 0.0
+    assert ladder.released().vector == 0.0
     between = [0.03**0.5, 0.003**0.5, 0.0003**0.5]
     steps = [one for share, middle in zip(SHARES[1:], between, strict=True) for one in (share, middle, share)]
     assert ladder.shares == pytest.approx([SHARES[0], *steps, 0.0])
@@ -70,11 +57,11 @@ def test_a_gain_between_two_keeps_the_model_in_step(monkeypatch: pytest.MonkeyPa
 
 def test_before_the_free_run_a_still_smaller_gain_is_put_in(monkeypatch: pytest.MonkeyPatch) -> None:
     ladder = Ladder(monkeypatch, 0.29, 0.004)
-    assert ladder.released(monkeypatch).share == 0.0
+    assert ladder.released().vector == 0.0
     assert ladder.shares[-3:] == pytest.approx([0.0, 0.3 * SHARES[-1], 0.0])
 
 
 def test_what_falls_out_of_step_at_every_gain_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     ladder = Ladder(monkeypatch, 0.999)
-    assert ladder.released(monkeypatch) is None
+    assert ladder.released() is None
     assert len(ladder.shares) == 1 + MORE + 1, "the first one has nothing to be compared with"

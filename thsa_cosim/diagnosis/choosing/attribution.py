@@ -15,11 +15,11 @@ from thsa_cosim.diagnosis.choosing.gates import SMALLEST_STRUCTURE
 from thsa_cosim.diagnosis.choosing.needless import further_parts, prune, within_range
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine
 from thsa_cosim.diagnosis.choosing.places import tied_places
-from thsa_cosim.diagnosis.choosing.ripples import freed, leaves_structure, on_orders
+from thsa_cosim.diagnosis.choosing.ripples import freed, on_orders
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
 from thsa_cosim.diagnosis.choosing.selection import Say, Selection
-from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE
+from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE, leaves_structure
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns

@@ -15,10 +15,11 @@ from thsa_cosim.diagnosis.choosing.chance import largest_gains, threshold
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, insignificant, out_of_range
 from thsa_cosim.diagnosis.choosing.observer import order_in_step
 from thsa_cosim.diagnosis.choosing.orders import Machine
-from thsa_cosim.diagnosis.choosing.ripples import leaves_structure, on_orders
+from thsa_cosim.diagnosis.choosing.ripples import on_orders
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, judge, refit, score
 from thsa_cosim.diagnosis.choosing.screen import Proposal, propose
 from thsa_cosim.diagnosis.choosing.selection import Say
+from thsa_cosim.diagnosis.choosing.verdict import leaves_structure
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.continuation import released
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine

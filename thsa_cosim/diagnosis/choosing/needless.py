@@ -54,10 +54,10 @@ def prune(
                 continue
             lost = block_gains(bench.of("validate"), validate, held)
             total = float(weights.base_held @ weights.base_held - held @ held)
-            sure = visible < np.inf and consistency(lost) >= SIGMAS
+            sure = consistency(lost) >= SIGMAS
             if sure and _explained(bench, weights, validate, held) > visible**2:
                 continue
-            if consistency(lost) < SIGMAS or float(lost.sum()) < 0.01 * total:
+            if not sure or float(lost.sum()) < 0.01 * total:
                 notes.append(f"{dropped.candidate.name} was dropped: the other effects explain the same")
                 accepted, current, held = kept, fit, validate
                 break
@@ -83,9 +83,8 @@ def within_range(
         accepted = accepted[:-1]
         current = accepted[-1].fit if accepted else base
         fewer = extended_unknowns(unknowns, accepted)
-        if set(current.unknowns.names) != set(
-            fewer.names
-        ):  # it was fitted beside an effect that was dropped before
+        # Its own fit holds every effect before it, those that were dropped since as well.
+        if set(current.unknowns.names) != set(fewer.names):
             again = refine(bench, fewer, current.at(fewer.names), jacobian=current.jacobian_of(fewer))
             if again is None:
                 return None

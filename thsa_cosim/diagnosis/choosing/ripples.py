@@ -12,10 +12,10 @@ from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.choosing.selection import Say
-from thsa_cosim.diagnosis.choosing.verdict import VISIBLE_BESIDE, is_visible
+from thsa_cosim.diagnosis.choosing.verdict import leaves_structure
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
-from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, errors, structure
+from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, structure
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
@@ -62,10 +62,3 @@ def freed(
     if not explains or consistency(block_gains(trials, held, validate)) < SIGMAS:
         return choice, *found
     return replace(choice, proposal=proposal, fit=free, validate=validate), free, validate
-
-
-def leaves_structure(
-    bench: Bench, weights: ChannelWeights, held: FloatArray, size: float = VISIBLE_BESIDE
-) -> bool:
-    """Whether the held-out residuals (N,) hold structure of ``size``, by default as the verdict counts it."""
-    return is_visible(errors(bench.of("validate"), weights.plain(held, "validate")), size)

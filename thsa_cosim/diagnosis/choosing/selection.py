@@ -22,7 +22,7 @@ from thsa_cosim.diagnosis.choosing.score import Scored, go_on, leaves_little, po
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.choosing.sizes import at_sizes, is_led_astray
 from thsa_cosim.diagnosis.choosing.starts import PROMISING, further_starts
-from thsa_cosim.diagnosis.choosing.verdict import VISIBLE, VISIBLE_BESIDE, is_visible
+from thsa_cosim.diagnosis.choosing.verdict import VISIBLE, is_visible, leaves_structure
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, errors
@@ -231,14 +231,8 @@ class Selection:
             left=self.weights.left(self.held),
             share=one.share,
             signal_share=signal_share(trials, base, self.held, one.validate),
-            visible=self._is_visible(one.validate),
-            was_visible=self._is_visible(self.held),
-        )
-
-    def _is_visible(self, held: FloatArray) -> bool:
-        """Whether held-out residuals (N,) hold structure that is to be seen in a model with effects."""
-        return is_visible(
-            errors(self.bench.of("validate"), self.weights.plain(held, "validate")), VISIBLE_BESIDE
+            visible=leaves_structure(self.bench, self.weights, one.validate),
+            was_visible=leaves_structure(self.bench, self.weights, self.held),
         )
 
     def choose(

@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
+from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.structure import errors, worst_share
 from thsa_cosim.diagnosis.fitting.trials import Trial
+from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.diagnosis.results import StructuredError, Verdict
 from thsa_cosim.signals import FloatArray
 
@@ -33,6 +35,13 @@ def verdict_on(errors_after: Mapping[str, StructuredError], accepted: int, teste
 def is_visible(found: Mapping[str, StructuredError], size: float) -> bool:
     """Whether some signal holds structure that is neither chance nor smaller than ``size`` (in its noise)."""
     return any(e.structure > size * e.noise and e.significance > SIGNIFICANT for e in found.values())
+
+
+def leaves_structure(
+    bench: Bench, weights: ChannelWeights, held: FloatArray, size: float = VISIBLE_BESIDE
+) -> bool:
+    """Whether the held-out residuals (N,) hold structure of ``size``, by default as the verdict counts it."""
+    return is_visible(errors(bench.of("validate"), weights.plain(held, "validate")), size)
 
 
 def left_over(trials: Sequence[Trial], before: FloatArray, after: FloatArray) -> float:

@@ -25,8 +25,11 @@ class Ladder:
 
     def refine(self, share: float, _unknowns: Any, last: float, **_more: Any) -> Any:
         self.shares.append(share)
+        return fitted(share, self.misfit(share, last))
+
+    def misfit(self, share: float, last: float) -> float:
         in_step = last == 1.0 or share >= self.reach * last or last <= self.low
-        return fitted(share, 100.0 if in_step else 1000.0)
+        return 100.0 if in_step else 1000.0
 
     def released(self) -> Any:
         following: Any = SimpleNamespace(at=lambda gain: gain / GAIN)
@@ -65,3 +68,25 @@ def test_what_falls_out_of_step_at_every_gain_is_given_up(monkeypatch: pytest.Mo
     ladder = Ladder(monkeypatch, 0.999)
     assert ladder.released() is None
     assert len(ladder.shares) == 1 + MORE + 1, "the first one has nothing to be compared with"
+
+
+def test_a_gain_is_put_in_no_more_where_the_last_one_has_not_helped(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Rising(Ladder):
+        def misfit(self, share: float, last: float) -> float:
+            return 115.0 if share < 0.15 else 100.0
+
+    ladder = Rising(monkeypatch, 1.0)
+    assert ladder.released().vector == 0.0
+    second = [SHARES[1], 0.03**0.5, SHARES[1]]
+    assert ladder.shares[: 1 + len(second)] == pytest.approx([SHARES[0], *second])
+    assert ladder.shares.count(SHARES[1]) == 2
+
+
+def test_what_hides_too_much_in_step_is_given_up_at_the_first_gain(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Hidden(Ladder):
+        def misfit(self, share: float, last: float) -> float:
+            return 201.0
+
+    ladder = Hidden(monkeypatch, 1.0)
+    assert ladder.released() is None
+    assert ladder.shares == [SHARES[0]]

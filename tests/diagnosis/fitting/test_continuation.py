@@ -82,6 +82,20 @@ def test_a_gain_is_put_in_no_more_where_the_last_one_has_not_helped(monkeypatch:
     assert ladder.shares.count(SHARES[1]) == 2
 
 
+@pytest.mark.parametrize(("later", "tries"), [(115.0, 3), (125.0, 2)])
+def test_a_gain_that_takes_back_half_of_the_growth_is_followed_by_another(
+    monkeypatch: pytest.MonkeyPatch, later: float, tries: int
+) -> None:
+    class Falling(Ladder):
+        def misfit(self, share: float, last: float) -> float:
+            again = self.shares.count(share)
+            return 100.0 if share != SHARES[1] or again > 2 else {1: 140.0, 2: later}[again]
+
+    ladder = Falling(monkeypatch, 1.0)
+    assert ladder.released().vector == 0.0
+    assert ladder.shares.count(SHARES[1]) == tries
+
+
 def test_what_hides_too_much_in_step_is_given_up_at_the_first_gain(monkeypatch: pytest.MonkeyPatch) -> None:
     class Hidden(Ladder):
         def misfit(self, share: float, last: float) -> float:

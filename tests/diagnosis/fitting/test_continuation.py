@@ -104,3 +104,11 @@ def test_what_hides_too_much_in_step_is_given_up_at_the_first_gain(monkeypatch: 
     ladder = Hidden(monkeypatch, 1.0)
     assert ladder.released() is None
     assert ladder.shares == [SHARES[0]]
+
+
+def test_the_misfit_is_compared_with_the_least_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Lost(Ladder):
+        def misfit(self, share: float, last: float) -> float:
+            return 40.0 if share == SHARES[0] else 90.0
+
+    assert Lost(monkeypatch, 1.0).released() is None, "less than twice 100 in step, more than twice 40"

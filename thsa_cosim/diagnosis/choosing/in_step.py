@@ -253,10 +253,10 @@ class InStep:
             is_harmonic = candidate.variant.beside and all(p.variable in known for p in waves)
             plain = not candidate.variant.beside and not candidate.variant.instead
             if waves and is_new and (is_harmonic if harmonic else plain):
-                starts = [
-                    {p.name: known.get(p.variable, order) for p in waves} for order in dict.fromkeys(orders)
+                rows += [
+                    (candidate, {p.name: known.get(p.variable, order) for p in waves})
+                    for order in dict.fromkeys(orders)
                 ]
-                rows += [(candidate, shapes) for shapes in starts]
         proposals = on_orders(propose(stepped, fit, rows), self.machine, fit)
         if not proposals:
             return None

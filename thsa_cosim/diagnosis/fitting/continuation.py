@@ -18,7 +18,7 @@ SHARES, ITERATIONS = (0.3, 0.1, 0.03, 0.01), 3
 SETTLED = 0.003
 #: It is given up where the misfit grows to so many times the least on the way: the model falls out of step. So it is
 #: where the first gain leaves so many times the misfit in step, whose force hid what is missing: 2.5 in a simulated
-#: unit whose effect in step was the wrong one, 0.87 to 1.34 in nine others.
+#: unit whose effect in step was the wrong one, 0.87 to 1.34 in nine others: so used while looking at them.
 LOST = 2.0
 #: Where it grows to so many times the least, a gain between the two is put in, at most so often. Set while looking at
 #: one simulated unit with a strong cogging of two harmonics.
@@ -34,7 +34,7 @@ def released(bench: Bench, following: Following, gain: float, fit: Fit) -> Fit |
     The way may be too steep for the ladder of gains: as long as it helps, one between the last two is gone to first.
     """
     least, last, ahead, more = np.inf, 1.0, [*SHARES, 0.0], MORE
-    before: dict[float, float] = {}
+    lost, before = LOST * fit.misfit, dict[float, float]()
     while ahead:
         share = ahead[0]
         again = refine(
@@ -55,8 +55,9 @@ def released(bench: Bench, following: Following, gain: float, fit: Fit) -> Fit |
             before[share] = misfit
             ahead.insert(0, float(np.sqrt(last * share)) if share else 0.3 * last)
             continue
-        if again is None or misfit > LOST * min(least, fit.misfit if last == 1.0 else np.inf):
+        if again is None or misfit > lost:
             return None
         fit, least, last = again, min(least, misfit), share
+        lost = LOST * least
         del ahead[0]
     return fit

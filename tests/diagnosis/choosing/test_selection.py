@@ -15,11 +15,11 @@ from thsa_cosim.diagnosis.choosing.selection import Selection, other_places, oth
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns, unknowns_of
 
 
-def proposal(effect: str, gain: float, place: str = "motor") -> Any:
+def proposal(effect: str, gain: float, place: str = "motor", variant: str = "x") -> Any:
     candidate = SimpleNamespace(
         effect=SimpleNamespace(name=effect),
         name=f"{effect}:{place}",
-        key=f"{effect}:{place}/x",
+        key=f"{effect}:{place}/{variant}",
         slot=SimpleNamespace(name=place),
         component=effect,
         coefficients=(None,),
@@ -37,6 +37,21 @@ def test_the_best_two_starts_of_the_best_six_effects_are_refined():
     assert worth_refining(late, 17.0) == late[:7], "a further start of an effect that is in"
     later = [*made[:7], proposal("e0", 900.0)]
     assert worth_refining(later, 17.0) == [*made[:6], later[7]], "behind an effect that is not"
+
+
+def test_variants_that_begin_as_one_law_are_one_start():
+    """Else a further parameter, which does nothing yet, takes the start of the same effect in another place."""
+    alike = [
+        proposal("a", 100.0),
+        proposal("a", 99.95, variant="y"),
+        proposal("a", 60.0, "gearbox"),
+        proposal("a", 59.0, "gearbox", "y"),
+    ]
+    assert worth_refining(alike, 17.0) == alike[:3]
+    elsewhere = [proposal("a", 100.0), proposal("a", 99.95, "gearbox"), proposal("a", 99.9, "screw")]
+    assert worth_refining(elsewhere, 17.0) == elsewhere[:2], "another place is another law"
+    again = [proposal("a", 100.0), proposal("a", 99.99), proposal("a", 99.98)]
+    assert worth_refining(again, 17.0) == again[:2], "so is another shape of one variant"
 
 
 def test_what_promises_no_more_than_chance_or_little_beside_the_best_is_not_refined():

@@ -15,6 +15,7 @@ from thsa_cosim.diagnosis.choosing.attribution import Judged
 from thsa_cosim.diagnosis.choosing.score import held_shapes, polish, score
 from thsa_cosim.diagnosis.choosing.screen import propose
 from thsa_cosim.diagnosis.choosing.self_excited import SHARES, SelfExcited
+from thsa_cosim.diagnosis.fitting import continuation
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
@@ -154,6 +155,20 @@ def test_where_no_free_run_is_better_the_fit_stays_and_its_errors_hold_what_was_
             values = way.fit.unknowns.named(way.fit.vector)
             assert values[f"{BLOCK}.v_S"] == pytest.approx(4.0, rel=0.15)
     assert own.weights is before
+
+
+def test_no_gain_is_put_in_on_the_way_to_the_free_run(monkeypatch: pytest.MonkeyPatch):
+    own, weights, found = stuck()
+    following = Following(own)
+    refined: list[float] = []  # misfits on the way
+
+    def growing(_bench: Bench, *_given: object, **_more: object) -> SimpleNamespace:
+        refined.append(1e-9 * 1.15 ** len(refined))
+        return SimpleNamespace(**vars(found[1]), misfit=refined[-1], jacobian=found[1].jacobian)
+
+    monkeypatch.setattr(continuation, "refine", growing)
+    assert continued(own, weights, found, following) is not None
+    assert len(refined) == len(continuation.SHARES) + 1
 
 
 def test_forms_are_compared_in_step_and_the_best_one_is_gone_on_with():

@@ -39,6 +39,8 @@ APART_SHARE = 0.02
 #: How many effects are refined after each screening, if they promise at least this share of the best one's gain, and
 #: with how many starts each.
 REFINED, WORTH, STARTS = 6, 0.03, 2
+#: Two variants of an effect in one place that promise the same but for this share begin as one law: one start.
+ALIKE = 1e-3
 #: Once an effect leaves no structure, only those that promise this share of its gain are refined as rivals; and only
 #: those that reach this share of the best gain in two iterations are refined further.
 RIVAL_WORTH = 0.3
@@ -63,10 +65,17 @@ def worth_refining(proposals: Sequence[Proposal], limit: float) -> list[Proposal
         name = proposal.candidate.effect.name
         if proposal.gain < worth or (name not in per_effect and len(per_effect) == REFINED):
             continue
-        per_effect[name] = per_effect.get(name, 0) + 1
-        if per_effect[name] <= STARTS:
+        begun = any(_begins_as(proposal, other) for other in chosen)
+        per_effect[name] = per_effect.get(name, 0) + (not begun)
+        if begun or per_effect[name] <= STARTS:
             chosen.append(proposal)
     return chosen
+
+
+def _begins_as(proposal: Proposal, other: Proposal) -> bool:
+    """Whether ``proposal`` is another variant of the law that ``other`` begins with, which promises no less."""
+    one, two = proposal.candidate, other.candidate
+    return one.name == two.name and one.key != two.key and proposal.gain >= (1.0 - ALIKE) * other.gain
 
 
 def each_start_once(proposals: Sequence[Proposal]) -> list[Proposal]:

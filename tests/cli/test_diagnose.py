@@ -170,6 +170,27 @@ def test_it_finds_the_effect_and_writes_a_model_that_predicts_to_the_noise(tmp_p
     assert f'b_q(unit="{value["unit"]}") = {found}' in (study / result["model"]).read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
+def test_a_law_that_no_effect_explains_is_told_with_what_ties_with_it(tmp_path: Path):
+    chosen = '[diagnose]\neffects = ["current-sensor-gain"]\nempirical = true\n'
+    path, study = scenario(tmp_path, **{"[diagnose]\n": chosen}), tmp_path / "study"
+    done = subprocess.run(
+        [sys.executable, "-m", "thsa_cosim.cli", "diagnose", str(path), "-o", str(study), "--workers", "2"],
+        capture_output=True,
+        text=True,
+        timeout=500,
+    )
+    assert done.returncode == 0, done.stderr
+    result = json.loads((study / "result.json").read_text(encoding="utf-8"))
+    assert result["effects"] == []
+    (law,) = result["empirical"]["terms"]
+    ((rival,),) = (other["terms"] for other in result["instead"])
+    assert {law["slot"], rival["slot"]} == {"motor", "gearbox"}, "a rigid gear"
+    assert law["term"] == rival["term"] == "v |v|"
+    assert "could not distinguish this law from another" in " ".join(done.stdout.split())
+    assert "in place of the law above" in (study / "report.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(("verdict", "code"), [("not-tested", 3), ("missing-effect", 0)])
 def test_a_study_in_which_no_effect_could_be_tried_leaves_with_3(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, verdict: str, code: int

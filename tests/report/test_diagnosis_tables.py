@@ -40,6 +40,10 @@ def test_laws_that_explain_as_much_as_the_effects_are_said():
     text = printed(instead=[{"terms": [term], "parameters": {}}])
     assert "from an empirical law in place of them: (-0.06 +- 0.0003) u at currentSensor." in text
     assert "in place of them" not in printed()
+    alone = printed(
+        verdict="unexplained-structure", effects=[], instead=[{"terms": [term], "parameters": {}}]
+    )
+    assert "could not distinguish this law from another: (-0.06 +- 0.0003) u at currentSensor." in alone
 
 
 def test_not_tested_and_what_is_left_beside_an_effect_are_said():

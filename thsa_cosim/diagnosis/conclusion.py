@@ -34,7 +34,7 @@ from thsa_cosim.diagnosis.explaining.dependence import dependence
 from thsa_cosim.diagnosis.explaining.empirical import FoundLaw, LawSearch, law_of
 from thsa_cosim.diagnosis.explaining.evidence import evidence
 from thsa_cosim.diagnosis.explaining.experiment import separating_experiment
-from thsa_cosim.diagnosis.explaining.instead import rival_laws
+from thsa_cosim.diagnosis.explaining.instead import rival_laws, tied_laws
 from thsa_cosim.diagnosis.explaining.slips import with_slips
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -99,6 +99,7 @@ class Conclusion:
         found_errors = errors(held_out, extended.identified.validate)
         verdict = verdict_on(found_errors, len(found.accepted), _tested(found))
         law: EmpiricalLaw | None = None
+        instead: tuple[RivalLaw, ...] = ()
         unexplained = verdict == "unexplained-structure" and self.box is None
         if unexplained and (why := note_on_no_law(share, empirical=self.spec.empirical)):
             found = replace(found, notes=(*found.notes, why))
@@ -110,10 +111,10 @@ class Conclusion:
                 found = replace(found, accepted=searched.effects, notes=(*found.notes, *searched.terms.notes))
                 if not found.accepted:
                     share = left_over(held_out, before.validate, before.validate)
+                    instead = tied_laws(searched.terms)
             if searched is not None:
                 fit = extended.identified.fit if self.spec.empirical else searched.terms.final
                 law = law_of(searched.terms, fit, added=self.spec.empirical)
-        instead: tuple[RivalLaw, ...] = ()
         if verdict == "missing-effect" and self.spec.empirical and self.box is None:
             instead = self._instead()
         after = extended.identified

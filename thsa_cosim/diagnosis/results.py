@@ -198,7 +198,7 @@ class EmpiricalLaw:
 
 @dataclass(frozen=True)
 class RivalLaw:
-    """A law that explains the held-out recordings as well as the effects do, in place of them.
+    """A law that explains the held-out recordings as well as the effects do, or the law found, in place of them.
 
     ``declared``: the declared parameters with it.
     """

@@ -114,7 +114,7 @@ def _diagnose(
         }
         machine = machine_of(tested.slots, signals_at(at_start))
         scan = wave_number_finder(bench, tested.slots, signals_at, machine)
-        slots = () if isinstance(tested, BlackBox) else tested.slots
+        slots = () if isinstance(tested, BlackBox) else tested.filled
         with Following(bench, slots, signals_at, opening) as following:
             in_step = InStep(bench, following, unknowns, tested.candidates, scan, machine, scenario.seed, say)
             found = attribute(

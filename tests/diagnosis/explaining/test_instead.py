@@ -11,7 +11,7 @@ from thsa_cosim.diagnosis.catalogue.effect import Connectors, Values
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.score import held_shapes
 from thsa_cosim.diagnosis.explaining.empirical import EMPIRICAL
-from thsa_cosim.diagnosis.explaining.instead import rival_laws
+from thsa_cosim.diagnosis.explaining.instead import rival_laws, tied_laws
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.results import RivalLaw
 
@@ -27,32 +27,35 @@ def squares() -> tuple[Candidate, ...]:
     return candidates_of([own], (MOTOR, GEAR), SCALES)
 
 
+def recorded(true: dict[str, float]) -> Bench:
+    offered = (*candidates("windage", "stribeck"), *squares())
+    return bench(offered, true, fixed=held_shapes(offered))
+
+
+def found(true: dict[str, float], offered: tuple[Candidate, ...]) -> Attribution:
+    """What is found among ``offered`` on recordings with the ``true`` effects."""
+    result = attribute(recorded(true), unknowns(), offered, lambda _: {}, seed=1)
+    assert result is not None
+    assert result.accepted
+    return result
+
+
 def laws(true: dict[str, float]) -> tuple[RivalLaw, ...]:
     """What ties with the effects that are found on recordings with the ``true`` ones."""
-    named, library = candidates("windage", "stribeck"), squares()
-
-    def recorded() -> Bench:
-        return bench((*named, *library), true, fixed=held_shapes((*named, *library)))
-
-    def found(offered: tuple[Candidate, ...]) -> Attribution:
-        result = attribute(recorded(), unknowns(), offered, lambda _: {}, seed=1)
-        assert result is not None
-        assert result.accepted
-        return result
-
-    return rival_laws(found(named), found(library), recorded().trials)
+    named = candidates("windage", "stribeck")
+    return rival_laws(found(true, named), found(true, squares()), recorded(true).trials)
 
 
 def test_a_law_that_explains_as_much_as_the_effect_is_its_rival_in_every_place():
-    found = laws(WINDAGE)
-    assert sorted((t.slot, t.term) for law in found for t in law.terms) == [
+    rivals = laws(WINDAGE)
+    assert sorted((t.slot, t.term) for law in rivals for t in law.terms) == [
         ("gear", "v |v|"),
         ("motor", "v |v|"),
     ]
-    by_place = {law.terms[0].slot: law for law in found}
+    by_place = {law.terms[0].slot: law for law in rivals}
     at_motor, at_gear = (by_place[slot].terms[0].coefficient.value for slot in ("motor", "gear"))
     assert np.isclose(at_gear, at_motor * 30.0**3, rtol=0.01)
-    for law in found:
+    for law in rivals:
         for name, value in DECLARED.items():
             assert abs(law.declared[name].value - value) < 5.0 * law.declared[name].stderr
 
@@ -60,3 +63,17 @@ def test_a_law_that_explains_as_much_as_the_effect_is_its_rival_in_every_place()
 def test_a_law_that_leaves_what_the_effects_explain_is_none():
     weak = {**STRIBECK, "motorEffect.stribeck.dF": 0.1}
     assert laws({**WINDAGE, **weak}) == ()
+
+
+def test_a_law_of_one_term_has_the_other_places_of_it_as_rivals_but_not_itself():
+    law = found(WINDAGE, squares())
+    (own,) = law.accepted
+    (rival,) = tied_laws(law)
+    (term,) = rival.terms
+    assert {term.slot, own.candidate.slot.name} == {"motor", "gear"}
+    assert term.term == "v |v|"
+
+
+def test_of_several_terms_no_other_law_is_told():
+    law = found(WINDAGE, squares())
+    assert tied_laws(replace(law, accepted=law.accepted * 2)) == ()

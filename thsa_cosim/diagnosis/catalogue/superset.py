@@ -36,6 +36,12 @@ class Superset:
     watched: tuple[Experiment, ...]
     signals_at: Callable[[Runner, Mapping[str, Mapping[str, float]]], Mapping[str, Signals]]
 
+    @property
+    def filled(self) -> tuple[Slot, ...]:
+        """The slots that an effect is offered in: of the others the FMU has no component that could follow a speed."""
+        names = {candidate.slot.name for candidate in self.candidates}
+        return tuple(slot for slot in self.slots if slot.name in names)
+
 
 def open_superset(
     scenario: Scenario,

@@ -3,6 +3,7 @@
 Effects of the catalogue that explain the recordings to the noise may imitate what is missing there, as friction in
 proportion to the load imitates the gain of a current sensor. So a law is searched as if no effect had been found; one
 that explains the held-out recordings as well is a rival of the effects, and so are the places where its term does so.
+A law of one term that was found where no effect explains anything has rivals of the same kind.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,7 +30,16 @@ def rival_laws(effects: Attribution, law: Attribution, trials: Sequence[Trial]) 
     gain = float(base @ base - ours @ ours)
     if consistency(lead) >= SIGMAS and float(lead.sum()) >= TIE_SHARE * gain:
         return ()
-    return tuple(RivalLaw(terms, values_of(fit, declared=True)) for terms, fit in _alternatives(law))
+    return tuple(_rival(terms, fit) for terms, fit in _alternatives(law))
+
+
+def tied_laws(law: Attribution) -> tuple[RivalLaw, ...]:
+    """Other terms that explain the held-out recordings as well as a ``law`` of one term, each in place of it."""
+    return tuple(_rival(terms, fit) for terms, fit in _alternatives(law))[1:]
+
+
+def _rival(terms: tuple[EmpiricalTerm, ...], fit: Fit) -> RivalLaw:
+    return RivalLaw(terms, values_of(fit, declared=True))
 
 
 def _alternatives(law: Attribution) -> Iterator[tuple[tuple[EmpiricalTerm, ...], Fit]]:

@@ -88,7 +88,9 @@ def structure(part: Part) -> Section | None:
         blocks.append(_law_table(law))
     rivals: list[Json] = (part.result or {}).get("instead", [])
     if rivals:
-        blocks.append(_rivals_table(rivals))
+        blocks.append(
+            _rivals_table(rivals, "the effects" if (part.result or {}).get("effects") else "the law above")
+        )
     return Section(f"{part.prefix}structure", "On what the residual depends", tuple(blocks))
 
 
@@ -110,17 +112,15 @@ def _term_cells(term: Json) -> tuple[Cell, ...]:
     )
 
 
-def _rivals_table(rivals: list[Json]) -> Table:
+def _rivals_table(rivals: list[Json], named: str) -> Table:
     columns = (Column("law"), *_TERM_COLUMNS)
     rows = [
         (Cell(str(k), k), *_term_cells(term))
         for k, law in enumerate(rivals, start=1)
         for term in law["terms"]
     ]
-    note = (
-        f"{_VARIABLES}. Each law explains the held-out recordings as well as the effects, in place of them."
-    )
-    return Table("Empirical laws in place of the effects ± one standard error", columns, rows, note)
+    note = f"{_VARIABLES}. Each law explains the held-out recordings as well as {named} would, alone."
+    return Table(f"Empirical laws in place of {named} ± one standard error", columns, rows, note)
 
 
 def _law_table(law: Json) -> Table:

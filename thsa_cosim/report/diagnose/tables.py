@@ -147,10 +147,11 @@ def empirical_law(content: Content) -> list[str]:
 
 
 def rival_laws(content: Content) -> list[str]:
-    """The laws that explain the held-out recordings as well as the effects, in place of them."""
+    """The laws that explain the held-out recordings as well as the effects, or the law that was found."""
+    effects = "the effects from an empirical law in place of them"
+    named = effects if content["effects"] else "this law from another"
     return [
-        "These recordings could not distinguish the effects from an empirical law in place of them:"
-        f" {_sum(law['terms'])}."
+        f"These recordings could not distinguish {named}: {_sum(law['terms'])}."
         for law in content.get("instead", [])
     ]
 

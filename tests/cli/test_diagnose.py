@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -130,10 +131,8 @@ def test_one_that_is_interrupted_says_that_there_is_no_result_yet_and_how_to_con
     )
 
 
-@pytest.mark.slow
-def test_it_finds_the_effect_and_writes_a_model_that_predicts_to_the_noise(tmp_path: Path):
-    chosen = '[diagnose]\neffects = ["windage", "stribeck", "current-sensor-gain", "friction-run-in"]\n'
-    path, study = scenario(tmp_path, **{"[diagnose]\n": chosen}), tmp_path / "study"
+def diagnosed(path: Path, study: Path) -> tuple[dict[str, Any], str]:
+    """The result of the command in a process of its own, and what it printed."""
     done = subprocess.run(
         [sys.executable, "-m", "thsa_cosim.cli", "diagnose", str(path), "-o", str(study), "--workers", "2"],
         capture_output=True,
@@ -141,7 +140,14 @@ def test_it_finds_the_effect_and_writes_a_model_that_predicts_to_the_noise(tmp_p
         timeout=500,
     )
     assert done.returncode == 0, done.stderr
-    result = json.loads((study / "result.json").read_text(encoding="utf-8"))
+    return json.loads((study / "result.json").read_text(encoding="utf-8")), done.stdout
+
+
+@pytest.mark.slow
+def test_it_finds_the_effect_and_writes_a_model_that_predicts_to_the_noise(tmp_path: Path):
+    chosen = '[diagnose]\neffects = ["windage", "stribeck", "current-sensor-gain", "friction-run-in"]\n'
+    path, study = scenario(tmp_path, **{"[diagnose]\n": chosen}), tmp_path / "study"
+    result, _ = diagnosed(path, study)
     assert result["verdict"] == "missing-effect"
     assert [e["name"] for e in result["effects"]] == ["windage:motor"]
     assert {b["equation"]: b["at_fault"] for b in result["balance"]} == {
@@ -174,20 +180,13 @@ def test_it_finds_the_effect_and_writes_a_model_that_predicts_to_the_noise(tmp_p
 def test_a_law_that_no_effect_explains_is_told_with_what_ties_with_it(tmp_path: Path):
     chosen = '[diagnose]\neffects = ["current-sensor-gain"]\nempirical = true\n'
     path, study = scenario(tmp_path, **{"[diagnose]\n": chosen}), tmp_path / "study"
-    done = subprocess.run(
-        [sys.executable, "-m", "thsa_cosim.cli", "diagnose", str(path), "-o", str(study), "--workers", "2"],
-        capture_output=True,
-        text=True,
-        timeout=500,
-    )
-    assert done.returncode == 0, done.stderr
-    result = json.loads((study / "result.json").read_text(encoding="utf-8"))
+    result, shown = diagnosed(path, study)
     assert result["effects"] == []
     (law,) = result["empirical"]["terms"]
     ((rival,),) = (other["terms"] for other in result["instead"])
     assert {law["slot"], rival["slot"]} == {"motor", "gearbox"}, "a rigid gear"
     assert law["term"] == rival["term"] == "v |v|"
-    assert "could not distinguish this law from another" in " ".join(done.stdout.split())
+    assert "could not distinguish this law from another" in " ".join(shown.split())
     assert "in place of the law above" in (study / "report.html").read_text(encoding="utf-8")
 
 

@@ -111,7 +111,8 @@ class Conclusion:
                 found = replace(found, accepted=searched.effects, notes=(*found.notes, *searched.terms.notes))
                 if not found.accepted:
                     share = left_over(held_out, before.validate, before.validate)
-                    instead = tied_laws(searched.terms)
+                    # Beside effects that the law made needless its rivals were not tried alone.
+                    instead = () if self.found.accepted else tied_laws(searched.terms)
             if searched is not None:
                 fit = extended.identified.fit if self.spec.empirical else searched.terms.final
                 law = law_of(searched.terms, fit, added=self.spec.empirical)

@@ -77,3 +77,11 @@ def test_a_law_of_one_term_has_the_other_places_of_it_as_rivals_but_not_itself()
 def test_of_several_terms_no_other_law_is_told():
     law = found(WINDAGE, squares())
     assert tied_laws(replace(law, accepted=law.accepted * 2)) == ()
+
+
+def test_the_rivals_are_those_of_the_round_in_which_the_law_was_accepted():
+    """Not of a term that was dropped since."""
+    law = found(WINDAGE, squares())
+    (own,) = law.accepted
+    dropped = replace(law.rounds[0], accepted=replace(own, proposal=replace(own.proposal)), rivals=())
+    assert len(tied_laws(replace(law, rounds=(dropped, *law.rounds)))) == 1

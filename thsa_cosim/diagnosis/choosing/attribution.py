@@ -108,6 +108,11 @@ class Attribution:
         return replace(final, residual=final.residual / self.factors, own=rows, shared=None)
 
 
+def round_of(found: Attribution, scored: Scored) -> Round:
+    """The round in which an accepted effect was accepted."""
+    return next(r for r in found.rounds if r.accepted is not None and r.accepted.proposal is scored.proposal)
+
+
 @dataclass(frozen=True, eq=False)
 class Begun:
     """What was found in another way than by screening: rounds, effects, the model's fit with them, and what to note.

@@ -7,7 +7,7 @@ import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.known import known_effects
-from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round, round_of
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine, Order, name_by_order
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal
@@ -94,7 +94,7 @@ def found_effects(
     values = values_of(fit, declared=False, stderr=stderr)
     effects = []
     for members in merged.values():
-        owner = _round_of(found, members[0])
+        owner = round_of(found, members[0])
         order = order_of(members[0], values, machine)
         name = _named(members[0], order)
         rivals = tuple(dict.fromkeys(_rival_name(r, machine) for r in owner.rivals))
@@ -176,10 +176,6 @@ def _parameters(members: list[Scored], values: Mapping[str, Value]) -> dict[str,
         for p in s.candidate.parameters
         if p.variable in values
     }
-
-
-def _round_of(found: Attribution, scored: Scored) -> Round:
-    return next(r for r in found.rounds if r.accepted is not None and r.accepted.proposal is scored.proposal)
 
 
 def judged(found: Attribution) -> tuple[Judged, ...]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from thsa_cosim.diagnosis.choosing.attribution import Attribution
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, round_of
 from thsa_cosim.diagnosis.choosing.forms import likelihood
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.fitting.fit import Fit
@@ -25,9 +25,7 @@ def between_models(found: Attribution, fit: Fit, trials: Sequence[Trial]) -> Flo
     """
     variance = np.zeros(len(fit.unknowns.members))
     for scored in found.accepted:
-        one = next(
-            r for r in found.rounds if r.accepted is not None and r.accepted.proposal is scored.proposal
-        )
+        one = round_of(found, scored)
         assert one.accepted is not None
         others = (*one.rivals, *one.forms)
         if others:

@@ -8,7 +8,7 @@ A law of one term that was found where no effect explains anything has rivals of
 
 from collections.abc import Iterator, Sequence
 
-from thsa_cosim.diagnosis.choosing.attribution import Attribution
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, round_of
 from thsa_cosim.diagnosis.choosing.findings import values_of
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS
 from thsa_cosim.diagnosis.choosing.score import Scored
@@ -17,7 +17,7 @@ from thsa_cosim.diagnosis.explaining.empirical import terms_of
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency
 from thsa_cosim.diagnosis.fitting.trials import Trial
-from thsa_cosim.diagnosis.results import EmpiricalTerm, RivalLaw
+from thsa_cosim.diagnosis.results import RivalLaw
 
 
 def rival_laws(effects: Attribution, law: Attribution, trials: Sequence[Trial]) -> tuple[RivalLaw, ...]:
@@ -30,27 +30,23 @@ def rival_laws(effects: Attribution, law: Attribution, trials: Sequence[Trial]) 
     gain = float(base @ base - ours @ ours)
     if consistency(lead) >= SIGMAS and float(lead.sum()) >= TIE_SHARE * gain:
         return ()
-    return tuple(_rival(terms, fit) for terms, fit in _alternatives(law))
+    return tuple(_alternatives(law))
 
 
 def tied_laws(law: Attribution) -> tuple[RivalLaw, ...]:
     """Other terms that explain the held-out recordings as well as a ``law`` of one term, each in place of it."""
-    return tuple(_rival(terms, fit) for terms, fit in _alternatives(law))[1:]
+    return tuple(_alternatives(law))[1:]
 
 
-def _rival(terms: tuple[EmpiricalTerm, ...], fit: Fit) -> RivalLaw:
-    return RivalLaw(terms, values_of(fit, declared=True))
-
-
-def _alternatives(law: Attribution) -> Iterator[tuple[tuple[EmpiricalTerm, ...], Fit]]:
+def _alternatives(law: Attribution) -> Iterator[RivalLaw]:
     """The law itself; of a single term what explains the held-out recordings as well."""
-    yield _terms(law.accepted, law.plain_final), law.plain_final
+    yield _law(law.accepted, law.plain_final)
     if len(law.accepted) == 1:
-        one = next(r for r in law.rounds if r.accepted is not None)
-        for rival in one.rivals:
-            yield _terms([rival], rival.fit), rival.fit
+        for rival in round_of(law, law.accepted[0]).rivals:
+            yield _law([rival], rival.fit)
 
 
-def _terms(scored: Sequence[Scored], fit: Fit) -> tuple[EmpiricalTerm, ...]:
+def _law(scored: Sequence[Scored], fit: Fit) -> RivalLaw:
     values = values_of(fit, declared=False)
-    return tuple(term for one in scored for term in terms_of(one, values))
+    terms = tuple(term for one in scored for term in terms_of(one, values))
+    return RivalLaw(terms, values_of(fit, declared=True))

@@ -101,7 +101,7 @@ class Conclusion:
         law: EmpiricalLaw | None = None
         instead: tuple[RivalLaw, ...] = ()
         unexplained = verdict == "unexplained-structure" and self.box is None
-        if unexplained and (why := note_on_no_law(share, empirical=self.spec.empirical)):
+        if unexplained and (why := note_on_no_law(share, self._sticking(), empirical=self.spec.empirical)):
             found = replace(found, notes=(*found.notes, why))
         elif unexplained:
             searched = self._law_search(extended.identified)
@@ -294,7 +294,7 @@ class Conclusion:
             yield f"{extended.fmu.name} is for {native_platform().fmi3} only; {again} compiles it for all platforms"
 
 
-def note_on_no_law(share: float, sticking: str = "", *, empirical: bool) -> str:
+def note_on_no_law(share: float, sticking: str, *, empirical: bool) -> str:
     """Why no law is searched in the ``share`` of the declared model's structure that effects leave; "" if one is.
 
     ``sticking``: an effect in the model that makes it stick and slip, "" for none.

@@ -26,6 +26,7 @@ from thsa_cosim.diagnosis.fitting.identified import identify_model
 from thsa_cosim.diagnosis.fitting.means import by_search
 from thsa_cosim.diagnosis.fitting.trials import (
     Trial,
+    finer,
     for_search,
     spec_of,
     trials_of,
@@ -127,9 +128,11 @@ def _diagnose(
                 most=spec.most,
                 machine=machine,
                 stuck=in_step.found,
-                continued=SelfExcited(bench, following, tested.candidates, say).continued,
+                continued=SelfExcited(bench, following, tested.candidates, scenario.seed, say).continued,
                 say=say,
             )
+    # What the search found at a finer tolerance is judged at no coarser one.
+    trials = finer(trials, min(t.case.tolerance or 1.0 for t in bench.trials))
     give_back()  # what the search took
     if found is None:
         reason = next(iter(bench.failures), "no run succeeded")

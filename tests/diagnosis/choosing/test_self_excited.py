@@ -14,8 +14,7 @@ from thsa_cosim.diagnosis.choosing import self_excited as room
 from thsa_cosim.diagnosis.choosing.attribution import Judged
 from thsa_cosim.diagnosis.choosing.score import held_shapes, polish, score
 from thsa_cosim.diagnosis.choosing.screen import propose
-from thsa_cosim.diagnosis.choosing.self_excited import SHARES, SelfExcited
-from thsa_cosim.diagnosis.fitting import continuation
+from thsa_cosim.diagnosis.choosing.self_excited import TOLERANCE, SelfExcited
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
@@ -31,11 +30,12 @@ FRACTION = {
 
 
 class Following:
-    """Follows with any gain: the same recordings; notes the gains and which signals counted."""
+    """Follows with any gain: the same recordings; notes what was asked for."""
 
     def __init__(self, own: Bench, gain: float | None = 10.0) -> None:
         self.own, self._gain = own, gain
-        self.asked: list[tuple[float, bool]] = []
+        self.asked: list[float] = []
+        self.fine: list[Bench] = []
 
     def of(self, _slot: object) -> "Following":
         return self
@@ -46,13 +46,14 @@ class Following:
     def followed(self, *_given: object) -> SimpleNamespace:
         return SimpleNamespace(channel="i")
 
-    def at(self, gain: float) -> Bench:
-        self.asked.append((gain, True))
+    def beside_signal(self, gain: float) -> Bench:
+        self.asked.append(gain)
         return self.own
 
-    def beside_signal(self, gain: float) -> Bench:
-        self.asked.append((gain, False))
-        return self.own
+    def finer(self, tolerance: float) -> Bench:
+        assert tolerance == TOLERANCE
+        self.fine.append(self.own.beside(self.own._engine._runner, self.own.trials, {}))
+        return self.fine[-1]
 
 
 def stuck(
@@ -95,12 +96,13 @@ def continued(
     following: Following,
     offered: Sequence[Candidate] = (),
 ) -> Any:
-    return SelfExcited(own, following, offered, lambda _: None).continued(weights, found)  # type: ignore[arg-type]
+    return SelfExcited(own, following, offered, 1, lambda _: None).continued(weights, found)  # type: ignore[arg-type]
 
 
-def test_a_better_fit_comes_from_step_by_falling_gains_and_says_by_which_ways():
+def test_a_better_fit_comes_from_step_by_spectra_and_is_gone_on_with_at_a_finer_tolerance():
     own, weights, found = stuck()
     following = Following(own)
+    before = own.evaluations
     made = continued(own, weights, found, following)
     assert made is not None
     (choice, fit, held), ways = made
@@ -110,12 +112,11 @@ def test_a_better_fit_comes_from_step_by_falling_gains_and_says_by_which_ways():
     values = fit.unknowns.named(fit.vector)
     assert values[f"{BLOCK}.v_S"] == pytest.approx(4.0, rel=0.15)
     assert choice.proposal is not found[0].proposal, "a round takes it for a new one"
-    assert [w.fit.unknowns.names for w in ways] == [fit.unknowns.names] * len(SHARES)
-    blind = [gain for gain, counts in following.asked if not counts]
-    counted = [gain for gain, counts in following.asked if counts]
-    assert blind == [share * 10.0 for share in SHARES], "there the followed signal does not count"
-    assert counted == sorted(counted, reverse=True)
-    assert max(counted) < min(blind)
+    assert [w.fit.unknowns.names for w in ways] == [fit.unknowns.names]
+    assert following.asked == [10.0], "in step the followed signal does not count"
+    (fine,) = following.fine
+    assert own._engine is fine._engine
+    assert own.evaluations > before + fine.evaluations - 1, "what ran before counts, and nothing twice"
 
 
 def test_what_leaves_only_noise_rises_with_the_speed_or_cannot_follow_stays():
@@ -129,49 +130,65 @@ def test_what_leaves_only_noise_rises_with_the_speed_or_cannot_follow_stays():
     assert not following.asked, "nothing was simulated for it"
 
 
-def test_a_fit_in_step_that_promises_too_little_counts_for_nothing(monkeypatch: pytest.MonkeyPatch):
+def test_what_cannot_be_fitted_in_step_counts_for_nothing(monkeypatch: pytest.MonkeyPatch):
     own, weights, found = stuck()
     following = Following(own)
-    monkeypatch.setattr(room, "PROMISE", 1.0)
+    monkeypatch.setattr(room, "refine", lambda *_given, **_more: None)
     assert continued(own, weights, found, following) is None
-    assert len(following.asked) == 1
+    assert not following.fine
 
 
+@pytest.mark.parametrize("freed", ["nothing runs", "no better", "insignificant", "no held-out run"])
 def test_where_no_free_run_is_better_the_fit_stays_and_its_errors_hold_what_was_found_in_step(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, freed: str
 ):
     own, weights, found = stuck()
-    before = own.weights
-    for free in (None, found[1]):
-        monkeypatch.setattr(room, "released", lambda *_given, free=free: free)
-        made = continued(own, weights, found, Following(own))
-        assert made is not None
-        (choice, fit, held), ways = made
-        assert (fit, held) == (found[1], found[2])
-        assert (choice.candidate, choice.fit) == (found[0].candidate, found[1])
-        assert choice.proposal is not found[0].proposal, "a round takes it for a new one"
-        assert len(ways) == len(SHARES)
-        for way in ways:
-            values = way.fit.unknowns.named(way.fit.vector)
-            assert values[f"{BLOCK}.v_S"] == pytest.approx(4.0, rel=0.15)
+    engine, before = own._engine, own.weights
+    better = replace(found[1], cost=0.0)
+    monkeypatch.setattr(
+        SelfExcited,
+        "_freed",
+        lambda _self, _fine, stepped: {
+            "nothing runs": None,
+            "no better": replace(stepped, fit=found[1]),
+        }.get(freed, replace(stepped, fit=better)),
+    )
+    if freed == "insignificant":
+        monkeypatch.setattr(room, "insignificant", lambda _one: "its interval includes zero")
+    if freed == "no held-out run":
+        run = Bench.residuals
+        monkeypatch.setattr(
+            Bench,
+            "residuals",
+            lambda self, u, v, part: [None] if part == "validate" else run(self, u, v, part),
+        )
+    made = continued(own, weights, found, Following(own))
+    assert made is not None
+    (choice, fit, held), ways = made
+    assert (fit, held) == (found[1], found[2])
+    assert (choice.candidate, choice.fit) == (found[0].candidate, found[1])
+    assert choice.proposal is not found[0].proposal, "a round takes it for a new one"
+    (way,) = ways
+    values = way.fit.unknowns.named(way.fit.vector)
+    assert values[f"{BLOCK}.v_S"] == pytest.approx(4.0, rel=0.15)
     assert own.weights is before
+    assert own._engine is engine
 
 
-def test_no_gain_is_put_in_on_the_way_to_the_free_run(monkeypatch: pytest.MonkeyPatch):
-    own, weights, found = stuck()
-    following = Following(own)
-    refined: list[float] = []  # misfits on the way
+def test_what_moves_in_the_ensemble_is_neither_known_nor_unknowable():
+    _own, _weights, found = stuck()
+    fit = found[1]
+    members = fit.unknowns.members
+    errors = {"R": 0.001, "K": 0.02, "c": 0.95, "b": 0.5}
+    stderr = np.array([errors.get(u.name, 0.1) * u.scale for u in members])
+    stepped = SimpleNamespace(unknowns=fit.unknowns, stderr=lambda: stderr)
+    spreads = room._spreads(fit.unknowns, fit.vector, stepped)  # type: ignore[arg-type]
+    for u, x, spread in zip(members, fit.vector, spreads, strict=True):
+        wanted = {"R": 0.0, "K": 0.5 * u.spread, "c": 0.0, "b": 0.5 * u.spread}
+        assert spread == pytest.approx(wanted.get(u.name, 0.1 * abs(x)))
 
-    def growing(_bench: Bench, *_given: object, **_more: object) -> SimpleNamespace:
-        refined.append(1e-9 * 1.15 ** len(refined))
-        return SimpleNamespace(**vars(found[1]), misfit=refined[-1], jacobian=found[1].jacobian)
 
-    monkeypatch.setattr(continuation, "refine", growing)
-    assert continued(own, weights, found, following) is not None
-    assert len(refined) == len(continuation.SHARES) + 1
-
-
-def test_forms_are_compared_in_step_and_the_best_one_is_gone_on_with():
+def test_forms_are_compared_by_spectra_and_the_best_one_is_gone_on_with():
     """A free run that is out of phase does not tell them apart; ``off`` 1 is the best fit of the wrong form."""
     own, weights, found = stuck(off=1.0, true=FRACTION)
     assert found[0].candidate.component != FORMS[1].component
@@ -185,7 +202,9 @@ def test_forms_are_compared_in_step_and_the_best_one_is_gone_on_with():
     assert values[FORMS[1].parameters[0].variable] == pytest.approx(0.6, rel=0.1)
     assert choice.proposal.shapes.keys() == {"v_S"}
     assert not any(p.variable in values for p in FORMS[0].parameters if p.variable not in FRACTION)
-    assert all(w.fit.unknowns.names == fit.unknowns.names for w in ways)
+    assert [w.candidate for w in ways] == [found[0].candidate], (
+        "only the form that was found is fitted in step"
+    )
     assert fit.cost < found[1].cost
     own, weights, found = stuck()
     made = continued(own, weights, found, Following(own), FORMS)

@@ -31,10 +31,10 @@ class Ladder:
         in_step = last == 1.0 or share >= self.reach * last or last <= self.low
         return 100.0 if in_step else 1000.0
 
-    def released(self, more: int = MORE) -> Any:
+    def released(self) -> Any:
         following: Any = SimpleNamespace(at=lambda gain: gain / GAIN)
         free: Any = 0.0
-        return released(free, following, GAIN, fitted(1.0), more)
+        return released(free, following, GAIN, fitted(1.0))
 
 
 def fitted(share: float, misfit: float = 100.0) -> Any:
@@ -56,15 +56,6 @@ def test_a_gain_between_two_keeps_the_model_in_step(monkeypatch: pytest.MonkeyPa
     between = [0.03**0.5, 0.003**0.5, 0.0003**0.5]
     steps = [one for share, middle in zip(SHARES[1:], between, strict=True) for one in (share, middle, share)]
     assert ladder.shares == pytest.approx([SHARES[0], *steps, 0.0])
-
-
-def test_no_more_gains_are_put_in_than_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    alone = Ladder(monkeypatch, 0.35, 0.01)
-    assert alone.released(0) is None
-    assert alone.shares == pytest.approx(SHARES[:2])
-    once = Ladder(monkeypatch, 0.35, 0.01)
-    assert once.released(1) is None
-    assert once.shares == pytest.approx([SHARES[0], SHARES[1], 0.03**0.5, SHARES[1], SHARES[2]])
 
 
 def test_before_the_free_run_a_still_smaller_gain_is_put_in(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -79,11 +79,12 @@ class Bench:
         self.weights: Mapping[str, float] = {}
         """Factors of the channels' residuals, 1 where none is given."""
         self._beside: list[Bench] = []
+        self._before = 0
 
     @property
     def evaluations(self) -> int:
         """Simulations so far, those of the benches `beside` it included."""
-        return self._engine.runs + sum(bench.evaluations for bench in self._beside)
+        return self._before + self._engine.runs + sum(bench.evaluations for bench in self._beside)
 
     def beside(self, runner: Runner, trials: Sequence[Trial], fixed: Mapping[str, float]) -> "Bench":
         """The same recordings driven otherwise, as ``trials``, with further ``fixed`` start values; weighed alike."""
@@ -91,6 +92,13 @@ class Bench:
         made.failures, made.weights = self.failures, self.weights
         self._beside.append(made)
         return made
+
+    def go_over(self, other: "Bench") -> None:
+        """Simulate from here on as ``other`` does, one `beside` this."""
+        if other is not self:
+            self._beside.remove(other)
+            self._before += self._engine.runs
+            self._engine, self.trials, self._fixed = other._engine, other.trials, other._fixed
 
     def factors(self, part: Part) -> FloatArray:
         """(N,) what the stacked residuals of ``part`` are multiplied by."""

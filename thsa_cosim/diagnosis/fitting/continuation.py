@@ -28,13 +28,12 @@ GROWN, MORE = 1.1, 6
 HELPED = 0.5
 
 
-def released(bench: Bench, following: Following, gain: float, fit: Fit, more: int = MORE) -> Fit | None:
+def released(bench: Bench, following: Following, gain: float, fit: Fit) -> Fit | None:
     """A ``fit`` in step by ``gain``, continued to the free run on ``bench``; None if it falls out of step there.
 
-    The way may be too steep for the ladder of gains: as long as it helps, one between the last two is gone to first,
-    ``more`` times at most.
+    The way may be too steep for the ladder of gains: as long as it helps, one between the last two is gone to first.
     """
-    least, last, ahead = np.inf, 1.0, [*SHARES, 0.0]
+    least, last, ahead, more = np.inf, 1.0, [*SHARES, 0.0], MORE
     lost, before = LOST * fit.misfit, dict[float, float]()
     while ahead:
         share = ahead[0]

@@ -5,11 +5,12 @@ Levenberg (1944), Marquardt (1963); what is known beforehand enters as one more 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from thsa_cosim.diagnosis.fitting.bench import Bench
+from thsa_cosim.diagnosis.fitting.trials import Part
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.search import DifferenceSettings, answer, difference_columns
 from thsa_cosim.signals import FloatArray
@@ -31,6 +32,16 @@ SERVED = 0.8
 HOPELESS = 4.0
 #: Information (of unknowns each scaled to 1) below which a combination of them is not determined at all.
 DETERMINED = 1e-11
+
+
+class Compared(Protocol):
+    """What a fit asks for of a `Bench`, or of one whose recordings are compared otherwise."""
+
+    def residuals(self, unknowns: Unknowns, vectors: FloatArray, part: Part) -> list[FloatArray | None]:
+        """Per vector (m, n) the residuals (N,), None where a run failed."""
+
+    def level(self, part: Part) -> float:
+        """Root mean square that noise alone leaves in them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +145,7 @@ def cost_of(unknowns: Unknowns, vector: FloatArray, residual: FloatArray) -> flo
 
 
 def columns(
-    bench: Bench,
+    bench: Compared,
     unknowns: Unknowns,
     vector: FloatArray,
     centre: FloatArray,
@@ -153,13 +164,13 @@ def columns(
     return answer(asked, lambda vectors: bench.residuals(unknowns, vectors, "fit"))
 
 
-def _response(bench: Bench, residual: FloatArray) -> float:
+def _response(bench: Compared, residual: FloatArray) -> float:
     """By how much a difference step is to move the residuals, as they are weighed."""
     return max(RESPONSE * bench.level("fit"), SHARE * float(np.linalg.norm(residual)))
 
 
 def refine(
-    bench: Bench,
+    bench: Compared,
     unknowns: Unknowns,
     vector: FloatArray,
     *,
@@ -232,7 +243,7 @@ def refine(
     return Fit(unknowns, vector, residual, jacobian, steps, cost, converged)
 
 
-def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, float]:
+def _step(bench: Compared, state: Fit, damping: float) -> tuple[Fit | None, float, float]:
     """One damped step: the better fit or None, the decrease that was promised, the next damping."""
     unknowns, scale = state.unknowns, state.unknowns.scale
     information = state.information
@@ -263,7 +274,7 @@ def _step(bench: Bench, state: Fit, damping: float) -> tuple[Fit | None, float, 
 
 
 def _tried(
-    bench: Bench, unknowns: Unknowns, vectors: Sequence[FloatArray]
+    bench: Compared, unknowns: Unknowns, vectors: Sequence[FloatArray]
 ) -> tuple[list[FloatArray | None], list[float]]:
     """Residuals (N,) and cost of each vector (n,); None and infinite where a run fails."""
     found = bench.residuals(unknowns, np.array(vectors), "fit")
@@ -271,7 +282,7 @@ def _tried(
     return list(found), costs
 
 
-def _further(bench: Bench, state: Fit, better: Fit) -> Fit:
+def _further(bench: Compared, state: Fit, better: Fit) -> Fit:
     """The best of ``better`` and the multiples of its step from ``state``, as far as they go on lowering the cost."""
     unknowns, step = state.unknowns, better.vector - state.vector
     for far in FURTHER:

@@ -26,7 +26,7 @@ from thsa_cosim.batch import Experiment, Runner
 from thsa_cosim.diagnosis.catalogue.slots import INJECTED, Slot
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.structure import split
-from thsa_cosim.diagnosis.fitting.trials import Trial
+from thsa_cosim.diagnosis.fitting.trials import Trial, finer
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.signals import FloatArray, Signals
 
@@ -127,6 +127,14 @@ class Following:
         assert self._followed is not None
         made.weights = {**made.weights, self._followed.channel: 0.0}
         return made
+
+    def finer(self, tolerance: float) -> Bench:
+        """The bench of the free run at a smaller relative ``tolerance``; itself where it has that."""
+        trials = finer(self._bench.trials, tolerance)
+        if trials == self._bench.trials:
+            return self._bench
+        runner = self._stack.enter_context(self._open_runner([t.experiment for t in trials]))
+        return self._bench.beside(runner, trials, {})
 
     def gain(self, unknowns: Unknowns, vector: FloatArray) -> float | None:
         """The least gain by which the model follows as well as it can; found at the given vector (n,), once.

@@ -151,6 +151,16 @@ def for_search(trials: tuple[Trial, ...], fmu: Path) -> tuple[Trial, ...]:
     return by_means(tuple(driven), SEARCHED_ROWS)
 
 
+def finer(trials: Sequence[Trial], tolerance: float) -> tuple[Trial, ...]:
+    """The same recordings simulated at a relative ``tolerance``, where they have a larger one."""
+    return tuple(
+        replace(t, case=replace(t.case, tolerance=tolerance))
+        if t.case.tolerance is not None and t.case.tolerance > tolerance
+        else t
+        for t in trials
+    )
+
+
 def with_wrapper(
     trials: tuple[Trial, ...], wrapper: Wrapper, fixed: Mapping[str, float] | None = None
 ) -> tuple[Trial, ...]:

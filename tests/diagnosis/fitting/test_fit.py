@@ -20,6 +20,7 @@ from thsa_cosim.diagnosis.fitting.trials import (
     SEARCHED,
     Trial,
     by_means,
+    finer,
     for_search,
     note_on_means,
 )
@@ -426,6 +427,16 @@ def test_the_runs_of_a_search_are_no_more_accurate_than_a_search_needs():
     assert [t.experiment.tolerance for t in for_search(own, Path("y.fmu"))] == [SEARCHED, SEARCHED]
     assert [t.experiment.most_steps for t in found] == [LEAST_STEPS, LEAST_STEPS]
     assert [t.experiment.most_steps for t in own] == [None, None]
+
+
+def test_only_coarser_runs_become_finer():
+    own = tuple(
+        replace(t, case=replace(t.case, tolerance=x))
+        for t, x in zip(3 * (trial("fit"),), (1e-4, 1e-7, None), strict=True)
+    )
+    found = finer(own, 1e-6)
+    assert [t.experiment.tolerance for t in found] == [1e-6, 1e-7, None]
+    assert found[1:] == own[1:]
 
 
 def test_a_fit_that_what_is_reached_elsewhere_is_too_far_from_is_given_up():

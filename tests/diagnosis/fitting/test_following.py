@@ -100,6 +100,32 @@ def test_the_least_gain_counts_that_follows_about_as_well_as_the_largest(monkeyp
     assert opened[0].closed
 
 
+def test_a_finer_free_run_has_its_own_processes_and_a_bench_can_go_over_to_it():
+    opened: list[tuple[Runner, list[float | None]]] = []
+
+    def open_runner(experiments: Any) -> Any:
+        opened.append((Runner(), [e.tolerance for e in experiments]))
+        return opened[-1][0]
+
+    own = bench(candidates("windage"), {})
+    own.trials = tuple(replace(t, case=replace(t.case, tolerance=1e-4)) for t in own.trials)
+    own.residuals(unknowns(), unknowns().start[None, :], "fit")
+    with Following(own, [MOTOR], lambda _values: signals(u=SPEED), open_runner) as following:
+        fine = following.finer(1e-6)
+        ((runner, tolerances),) = opened
+        assert tolerances == [1e-6] * len(own.trials)
+        assert own.evaluations == 1
+        own.go_over(fine)
+        assert own.trials == fine.trials
+        assert own._engine is fine._engine
+        assert own.evaluations == 1, "what ran before counts, and nothing twice"
+        assert following.finer(1e-6) is own, "it has that tolerance"
+        own.go_over(own)
+        assert own.evaluations == 1
+        assert len(opened) == 1
+    assert runner.closed
+
+
 def test_without_a_speed_that_is_measured_there_is_no_gain():
     own = bench(candidates("windage"), {})
     with Following(own, [MOTOR], lambda _values: signals(), lambda _: None) as following:  # type: ignore[arg-type,return-value]

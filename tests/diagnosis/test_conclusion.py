@@ -25,10 +25,14 @@ def test_no_law_is_described_beside_what_makes_the_model_stick_and_slip():
     assert "empirical = true" in said
 
 
-@pytest.mark.parametrize(("effect", "values"), [("stribeck", {"dF": 0.6, "v_S": 4.0, "n": 1.0}), ("windage", {"c": 1e-3})])
+@pytest.mark.parametrize(
+    ("effect", "values"), [("stribeck", {"dF": 0.6, "v_S": 4.0, "n": 1.0}), ("windage", {"c": 1e-3})]
+)
 def test_what_falls_over_the_speed_is_what_makes_it_stick(effect: str, values: dict[str, float]):
     one = next(c for c in candidates(effect) if not c.variant.beside)
     at = {p.variable: values[p.name] for p in one.parameters if p.name in values}
     final = SimpleNamespace(unknowns=SimpleNamespace(named=lambda _vector: at), vector=np.zeros(0))
-    asked: Any = SimpleNamespace(found=SimpleNamespace(accepted=(SimpleNamespace(candidate=one),), final=final))
+    asked: Any = SimpleNamespace(
+        found=SimpleNamespace(accepted=(SimpleNamespace(candidate=one),), final=final)
+    )
     assert Conclusion._sticking(asked) == (one.name if effect == "stribeck" else "")

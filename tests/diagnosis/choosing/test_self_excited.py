@@ -11,7 +11,7 @@ import pytest
 from diagnosis.analytic import bench, candidates, unknowns
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing import self_excited as room
-from thsa_cosim.diagnosis.choosing.attribution import Judged
+from thsa_cosim.diagnosis.choosing.attribution import Continued, Judged, attribute
 from thsa_cosim.diagnosis.choosing.score import held_shapes, polish, score
 from thsa_cosim.diagnosis.choosing.screen import propose
 from thsa_cosim.diagnosis.choosing.self_excited import TOLERANCE, SelfExcited
@@ -48,6 +48,9 @@ class Following:
 
     def beside_signal(self, gain: float) -> Bench:
         self.asked.append(gain)
+        return self.own
+
+    def at(self, gain: float) -> Bench:
         return self.own
 
     def finer(self, tolerance: float) -> Bench:
@@ -105,7 +108,7 @@ def test_a_better_fit_comes_from_step_by_spectra_and_is_gone_on_with_at_a_finer_
     before = own.evaluations
     made = continued(own, weights, found, following)
     assert made is not None
-    (choice, fit, held), ways = made
+    (choice, fit, held), ways = made.found, made.ways
     assert fit.cost < 0.9 * found[1].cost
     assert choice.fit is fit
     assert choice.validate is held
@@ -164,7 +167,7 @@ def test_where_no_free_run_is_better_the_fit_stays_and_its_errors_hold_what_was_
         )
     made = continued(own, weights, found, Following(own))
     assert made is not None
-    (choice, fit, held), ways = made
+    (choice, fit, held), ways = made.found, made.ways
     assert (fit, held) == (found[1], found[2])
     assert (choice.candidate, choice.fit) == (found[0].candidate, found[1])
     assert choice.proposal is not found[0].proposal, "a round takes it for a new one"
@@ -173,6 +176,51 @@ def test_where_no_free_run_is_better_the_fit_stays_and_its_errors_hold_what_was_
     assert values[f"{BLOCK}.v_S"] == pytest.approx(4.0, rel=0.15)
     assert own.weights is before
     assert own._engine is engine
+
+
+def test_where_the_new_weights_lead_it_astray_the_fit_stays_as_it_was_found(monkeypatch: pytest.MonkeyPatch):
+    own, weights, found = stuck()
+    before = own.weights
+    astray: list[Fit] = []
+    weigh = ChannelWeights.weigh
+
+    def led(self: ChannelWeights, fit: Fit) -> Any:
+        astray.append(fit)
+        again, held = weigh(self, fit)
+        return replace(again, vector=again.vector * 0.0), held
+
+    monkeypatch.setattr(ChannelWeights, "weigh", led)
+    made = continued(own, weights, found, Following(own))
+    assert made is not None
+    (choice, fit, held), _ways = made.found, made.ways
+    assert fit is choice.fit is astray[0]
+    assert held is choice.validate
+    assert own.weights == before
+
+
+@pytest.mark.parametrize("is_all", [True, False])
+def test_nothing_further_is_looked_for_where_nothing_else_is_missing_in_step(is_all: bool):
+    offered = tuple(c for c in candidates("stribeck", "windage") if c.slot.name == "motor")
+    drag = {f"motorEffect.windage.{name}": x for name, x in (("b_q", 1.5e-3), ("n", 2.0), ("v_r", 30.0))}
+    own = bench(offered, {**CURVE, **drag}, 3, held_shapes(offered))
+    found = attribute(
+        own,
+        unknowns(),
+        offered,
+        lambda _: {},
+        seed=1,
+        continued=lambda _weights, one: Continued(one, (), is_all),
+    )
+    assert found is not None
+    assert len(found.accepted) == (1 if is_all else 2)
+
+
+def test_in_step_nothing_else_is_missing_if_only_noise_is_left_in_every_signal():
+    own, _weights, found = stuck(off=1.0)
+    assert room._leaves_noise(own, found[1])
+    off = found[1].vector.copy()
+    off[found[1].unknowns.names.index("R")] *= 1.02
+    assert not room._leaves_noise(own, replace(found[1], vector=off))
 
 
 def test_what_moves_in_the_ensemble_is_neither_known_nor_unknowable():
@@ -193,10 +241,10 @@ def test_forms_are_compared_by_spectra_and_the_best_one_is_gone_on_with():
     own, weights, found = stuck(off=1.0, true=FRACTION)
     assert found[0].candidate.component != FORMS[1].component
     alone = continued(own, weights, found, Following(own))
-    assert alone is None or alone[0][0].candidate is found[0].candidate
+    assert alone is None or alone.found[0].candidate is found[0].candidate
     made = continued(own, weights, found, Following(own), FORMS)
     assert made is not None
-    (choice, fit, _held), ways = made
+    (choice, fit, _held), ways = made.found, made.ways
     assert choice.candidate is FORMS[1]
     values = fit.unknowns.named(fit.vector)
     assert values[FORMS[1].parameters[0].variable] == pytest.approx(0.6, rel=0.1)
@@ -209,4 +257,4 @@ def test_forms_are_compared_by_spectra_and_the_best_one_is_gone_on_with():
     own, weights, found = stuck()
     made = continued(own, weights, found, Following(own), FORMS)
     assert made is not None
-    assert made[0][0].candidate is found[0].candidate, "the form that is true stays"
+    assert made.found[0].candidate is found[0].candidate, "the form that is true stays"

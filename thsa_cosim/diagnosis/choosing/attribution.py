@@ -134,8 +134,22 @@ Begin = Callable[[ChannelWeights, Fit, FloatArray], Begun | None]
 
 #: An accepted effect, the model's fit with it, and its held-out residuals (N,).
 Judged = tuple[Scored, Fit, FloatArray]
-#: The weights, and what was accepted → the same, or better, and what was found on another way; None: no other way.
-Continue = Callable[[ChannelWeights, Judged], tuple[Judged, tuple[Scored, ...]] | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Continued:
+    """An accepted effect as it was, or better, and what was found on the ``ways`` to that.
+
+    ``is_all``: nothing else is missing, whatever the free run leaves.
+    """
+
+    found: Judged
+    ways: tuple[Scored, ...]
+    is_all: bool = False
+
+
+#: The weights, and what was accepted → what it leads to; None: there is no other way.
+Continue = Callable[[ChannelWeights, Judged], Continued | None]
 
 
 def attribute(
@@ -187,6 +201,7 @@ def attribute(
     rounds: list[Round] = []
     accepted: list[Scored] = []
     said: list[str] = []
+    is_all = False
     begun = begin(weights, base, held)
     if begun is not None:
         rounds, accepted, current, current_held = [*begun.rounds], [*begun.accepted], begun.fit, begun.held
@@ -227,15 +242,15 @@ def attribute(
                 choice, fit, current_held = freed(bench, weights, choice, (fit, reweighed), say)
                 way = continued(weights, (choice, fit, current_held))
                 if way is not None:
-                    led = way[0][1] is not fit
-                    (choice, fit, current_held), ways = way
-                    rounds[-1] = replace(rounds[-1], forms=ways)
+                    led, is_all = way.found[1] is not fit, way.is_all
+                    choice, fit, current_held = way.found
+                    rounds[-1] = replace(rounds[-1], forms=way.ways)
                     said.append(choice.candidate.name + (CONTINUED if led else NOT_CONTINUED))
             rounds[-1] = rounds[-1].with_accepted(choice)
             accepted.append(choice)
             current = fit
-            offered = further_parts(choice.candidate, candidates)
-        if offered is candidates:
+            offered = () if is_all else further_parts(choice.candidate, candidates)
+        if is_all or offered is candidates:
             break
     notes: list[str] = []
     if not settled:  # else what is left may be what bends the model

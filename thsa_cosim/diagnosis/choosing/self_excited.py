@@ -9,7 +9,7 @@ find the optimum. The cycles add up the solver's errors: the free run is simulat
 """
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -42,9 +42,9 @@ TOLERANCE = 1e-6
 #: what is known better has no part in it, what is known worse shows nowhere. They begin as far apart as HALF their
 #: spreads, the effect's own as this SHARE of their values.
 MOVES, HALF, SHARE = (0.01, 0.9), 0.5, 0.1
-#: After so many rounds, and again and again, a form is given up that leaves so many times the least of all forms. Set
-#: while looking at three simulated units, of which the true form was ahead by 3 to 60 % after five rounds.
-ROUNDS, APART = 5, 1.1
+#: After so many rounds the forms go on that leave no more than so many times the least of all; after as many more only
+#: the best does. Set while looking at three simulated units: the true form was ahead by 3 to 60 % after five rounds.
+ROUNDS, ALIKE = 5, 1.1
 #: In step nothing else is missing if no signal leaves more than this many standard deviations of its noise. Set while
 #: looking at the same: 1.00 to 1.015 with nothing else, from 1.06 on with a wrong effect.
 ALONE = 1.05
@@ -128,16 +128,19 @@ class SelfExcited:
             )
             for _, unknowns, vector, _ in ways
         ]
-        reached: dict[int, tuple[FloatArray, float]] = {}
-        going = list(range(len(ways)))
-        while going:
-            further = {k: deque(islice(rounds[k], ROUNDS), maxlen=1) for k in going}
-            reached |= {k: last[0] for k, last in further.items() if last}
-            least = min((cost for _, cost in reached.values()), default=np.inf)
-            going = [k for k in going if further[k] and reached[k][1] <= APART * least]
+
+        def further(which: Iterable[int], count: int | None) -> dict[int, tuple[FloatArray, float]]:
+            """The vector (n,) and sum of squares that each way reaches in so many rounds more, if it goes on."""
+            lasts = {k: deque(islice(rounds[k], count), maxlen=1) for k in which}
+            return {k: last[0] for k, last in lasts.items() if last}
+
+        reached = further(range(len(ways)), ROUNDS)
         if not reached:
             return None
+        least = min(cost for _, cost in reached.values())
+        reached |= further([k for k, (_, cost) in reached.items() if cost <= ALIKE * least], ROUNDS)
         best = min(reached, key=lambda k: reached[k][1])
+        reached |= further([best], None)
         one, unknowns, _, steps = ways[best]
         vector, _ = reached[best]
         near = refine(spectra, unknowns, vector, steps=steps, iterations=FINAL, enough=10.0)

@@ -28,7 +28,7 @@ from thsa_cosim.diagnosis.fitting.ensemble import descent
 from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
 from thsa_cosim.diagnosis.fitting.following import Following
 from thsa_cosim.diagnosis.fitting.spectra import Spectra
-from thsa_cosim.diagnosis.fitting.structure import split
+from thsa_cosim.diagnosis.fitting.structure import rms_by_channel
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns, unknowns_of
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
@@ -187,5 +187,5 @@ def _leaves_noise(following: Bench, stepped: Fit) -> bool:
     (residual,) = following.residuals(stepped.unknowns, stepped.vector[None, :], "fit")
     if residual is None:
         return False
-    signals = split(following.of("fit"), residual / following.factors("fit")).values()
-    return all(float(np.mean(np.concatenate(parts) ** 2)) < ALONE**2 for parts in signals)
+    left = rms_by_channel(following.of("fit"), residual / following.factors("fit"))
+    return max(left.values()) < ALONE

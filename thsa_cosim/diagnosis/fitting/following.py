@@ -25,7 +25,7 @@ from scipy.signal import lfilter
 from thsa_cosim.batch import Experiment, Runner
 from thsa_cosim.diagnosis.catalogue.slots import INJECTED, Slot
 from thsa_cosim.diagnosis.fitting.bench import Bench
-from thsa_cosim.diagnosis.fitting.structure import split
+from thsa_cosim.diagnosis.fitting.structure import rms_by_channel
 from thsa_cosim.diagnosis.fitting.trials import Trial, finer
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns
 from thsa_cosim.signals import FloatArray, Signals
@@ -175,8 +175,7 @@ class Following:
         (residual,) = bench.residuals(unknowns, vector[None, :], "fit")
         if residual is None:
             return np.inf
-        parts = split(bench.of("fit"), residual / bench.factors("fit"))[followed.channel]
-        return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+        return rms_by_channel(bench.of("fit"), residual / bench.factors("fit"))[followed.channel]
 
 
 def find_followed(

@@ -30,6 +30,14 @@ def split(trials: Sequence[Trial], residual: FloatArray) -> dict[str, list[Float
     return parts
 
 
+def rms_by_channel(trials: Sequence[Trial], residual: FloatArray) -> dict[str, float]:
+    """Root mean square of the stacked ``residual`` (N,) over all recordings, by channel."""
+    return {
+        name: float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+        for name, parts in split(trials, residual).items()
+    }
+
+
 def per_trial(trials: Sequence[Trial], residual: FloatArray) -> list[dict[str, FloatArray]]:
     """Stacked residuals (N,) → per recording its channels' residuals by name, in standard deviations."""
     found: list[dict[str, FloatArray]] = []

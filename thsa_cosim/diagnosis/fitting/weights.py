@@ -11,7 +11,7 @@ import numpy as np
 
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
-from thsa_cosim.diagnosis.fitting.structure import split, structure
+from thsa_cosim.diagnosis.fitting.structure import rms_by_channel, structure
 from thsa_cosim.diagnosis.fitting.trials import Part
 from thsa_cosim.signals import FloatArray
 
@@ -32,8 +32,8 @@ class ChannelWeights:
         The weights stay as they are where the fit under new ones cannot be simulated on the held-out recordings.
         """
         bench, before, after = self._bench, self._bench.weights, {}
-        for name, parts in split(bench.of("fit"), self.plain(fit.residual, "fit")).items():
-            after[name] = 1.0 / max(1.0, float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
+        for name, rms in rms_by_channel(bench.of("fit"), self.plain(fit.residual, "fit")).items():
+            after[name] = 1.0 / max(1.0, rms)
         if any(not 1.0 / SAME < after[name] / before.get(name, 1.0) < SAME for name in after):
             factors = bench.factors("fit")
             self.take(after)

@@ -44,6 +44,7 @@ from thsa_cosim.diagnosis.fitting.structure import errors, errors_by_recording
 from thsa_cosim.diagnosis.fitting.trials import (
     Trial,
     note_on_means,
+    note_on_tolerance,
     with_wrapper,
 )
 from thsa_cosim.diagnosis.fitting.uncertainty import standard_errors
@@ -284,6 +285,7 @@ class Conclusion:
         yield from self.bench.notes
         yield from note_on_means(self.trials)
         yield from found.notes
+        yield from note_on_tolerance(self.trials, self.scenario.simulation.tolerance)
         if self.box is not None:
             yield from self.box.notes
         if not _tested(found):

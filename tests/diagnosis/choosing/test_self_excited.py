@@ -11,7 +11,7 @@ import pytest
 from diagnosis.analytic import bench, candidates, unknowns
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing import self_excited as room
-from thsa_cosim.diagnosis.choosing.attribution import Continued, Judged, attribute
+from thsa_cosim.diagnosis.choosing.attribution import IS_ALL, Continued, Judged, attribute
 from thsa_cosim.diagnosis.choosing.score import held_shapes, polish, score
 from thsa_cosim.diagnosis.choosing.screen import propose
 from thsa_cosim.diagnosis.choosing.self_excited import TOLERANCE, SelfExcited
@@ -213,6 +213,7 @@ def test_nothing_further_is_looked_for_where_nothing_else_is_missing_in_step(is_
     )
     assert found is not None
     assert len(found.accepted) == (1 if is_all else 2)
+    assert (IS_ALL in found.notes) is is_all
 
 
 def test_in_step_nothing_else_is_missing_if_only_noise_is_left_in_every_signal():

@@ -91,3 +91,20 @@ def test_where_the_start_fails_or_nothing_moves_there_is_nothing():
 def test_the_seed_decides():
     assert [c for _, c in run(rugged)] == [c for _, c in run(rugged)]
     assert [c for _, c in run(rugged)] != [c for _, c in run(rugged, seed=2)]
+
+
+def test_a_start_that_leaves_nothing_is_the_end():
+    ((found, cost),) = run(lambda x: ROWS @ (x - TRUE), start=TRUE)
+    assert cost == 0.0
+    assert found == pytest.approx(TRUE)
+
+
+def test_a_long_narrow_valley_is_gone_along_ever_faster():
+    """The end is 500 spreads away, and a step reaches 2: steps that are tried again, and 3 times, get there."""
+
+    def valley(x: np.ndarray) -> np.ndarray:
+        return np.array([x[0] - 10.0, 30.0 * (x[1] - x[0]), x[2] - 1.0, 0.5])
+
+    found, cost = run(valley, start=np.zeros(3), spreads=np.full(3, 0.02))[-1]
+    assert found == pytest.approx([10.0, 10.0, 1.0], abs=0.05)
+    assert cost == pytest.approx(0.25, rel=0.02)

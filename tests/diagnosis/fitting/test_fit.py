@@ -23,6 +23,7 @@ from thsa_cosim.diagnosis.fitting.trials import (
     finer,
     for_search,
     note_on_means,
+    note_on_tolerance,
 )
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
@@ -128,6 +129,18 @@ def test_long_recordings_are_compared_by_means_which_the_diagnosis_says():
     assert {c.mean_of for t in long for c in t.case.channels} == {2 + TIME.size % 2}
     (note,) = note_on_means(long)
     assert f"means of {2 + TIME.size % 2} neighbouring samples" in note
+
+
+def test_a_finer_tolerance_than_the_declared_one_is_kept_and_said():
+    given = [trial("fit"), trial("validate")]
+    declared = [replace(t, case=replace(t.case, tolerance=1e-5)) for t in given]
+    assert note_on_tolerance(declared, 1e-5) == note_on_tolerance(given, None) == []
+    assert {t.case.tolerance for t in finer(declared, 1e-4)} == {1e-5}
+    made = finer(declared, 1e-6)
+    assert {t.case.tolerance for t in made} == {1e-6}
+    (note,) = note_on_tolerance(made, 1e-5)
+    assert "simulation.tolerance = 1e-05" in note
+    assert "set it to 1e-06" in note
 
 
 def test_it_finds_the_least_squares_and_its_standard_errors():

@@ -35,6 +35,8 @@ NOT_CONTINUED = (
     " makes the machine stick and slip, and the model falls out of step with it: fits with it kept in step with a"
     " measured speed lead to no better free run; the stated errors hold what they differ by"
 )
+#: What is noted where such an effect is all that is missing.
+IS_ALL = "nothing further was looked for: kept in step, the model leaves nothing but noise in any signal"
 #: Objections to what another form, or another effect, takes the place of.
 TAKEN = "another form of it fits better"
 APART = "explains the held-out recordings as well, but not the fit recording that distinguishes them"
@@ -246,6 +248,7 @@ def attribute(
                     choice, fit, current_held = way.found
                     rounds[-1] = replace(rounds[-1], forms=way.ways)
                     said.append(choice.candidate.name + (CONTINUED if led else NOT_CONTINUED))
+                    said += [IS_ALL] if is_all else []
             rounds[-1] = rounds[-1].with_accepted(choice)
             accepted.append(choice)
             current = fit

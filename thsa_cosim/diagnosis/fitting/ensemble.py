@@ -70,6 +70,10 @@ def descent(
         return
     z, residual = known[0], found[0]
     cost = float(residual @ residual)
+    exact = np.finfo(float).eps * cost  # less is rounding
+    if not cost:
+        yield at(z), cost
+        return
     curvature = np.zeros((moving.size, moving.size))
     share, idle, last = SHARE, 0, np.zeros(moving.size)
     for _ in range(ROUNDS):
@@ -94,7 +98,7 @@ def descent(
         yield at(z), cost
         idle = idle + 1 if gained < SETTLED else 0
         share = share * NARROWER if gained < SLOW else min(SHARE, share * WIDER)
-        if idle == PATIENCE or not cost:
+        if idle == PATIENCE or cost <= exact:
             return
 
 
@@ -118,7 +122,7 @@ def _regression(
     apart = np.linalg.solve(width, (known - z).T).T
     distance = np.linalg.norm(apart, axis=1) / np.sqrt(z.size)
     near = np.argsort(distance)[: 3 * MEMBERS * z.size]
-    near = near[distance[near] < NEAR]
+    near = near[distance[near] <= max(NEAR, distance[near[0]])]  # one at least
     weights = np.exp(-0.5 * np.maximum(0.0, distance[near] - 1.0) ** 2)[:, None]
     terms = np.concatenate([np.ones((near.size, 1)), apart[near]], axis=1)
     normal = terms.T @ (weights * terms) + RIDGE * near.size * np.eye(z.size + 1)

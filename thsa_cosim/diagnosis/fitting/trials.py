@@ -161,6 +161,18 @@ def finer(trials: Sequence[Trial], tolerance: float) -> tuple[Trial, ...]:
     )
 
 
+def note_on_tolerance(trials: Sequence[Trial], declared: float | None) -> list[str]:
+    """What to say of ``trials`` that are simulated at a finer relative tolerance than the ``declared`` one, if so."""
+    own = min((t.case.tolerance for t in trials if t.case.tolerance is not None), default=declared)
+    if own is None or declared is None or own >= declared:
+        return []
+    return [
+        "every cycle of sticking and slipping adds to the solver's errors: the extended model is simulated at a"
+        f" relative tolerance of {own:g}, not at simulation.tolerance = {declared:g}; set it to {own:g} where the model"
+        " is used"
+    ]
+
+
 def with_wrapper(
     trials: tuple[Trial, ...], wrapper: Wrapper, fixed: Mapping[str, float] | None = None
 ) -> tuple[Trial, ...]:

@@ -13,14 +13,22 @@ from diagnosis.analytic import DECLARED, bench, candidates, unknowns
 from thsa_cosim.diagnosis.choosing import forms as room
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import found_effects, judged
-from thsa_cosim.diagnosis.choosing.forms import best_form, criterion, likelihood, rivals_forms
+from thsa_cosim.diagnosis.choosing.forms import (
+    best_form,
+    criterion,
+    from_other_starts,
+    likelihood,
+    rivals_forms,
+)
 from thsa_cosim.diagnosis.choosing.score import Scored, held_shapes
-from thsa_cosim.diagnosis.choosing.selection import RIVAL_SHARE, RIVAL_WORTH
+from thsa_cosim.diagnosis.choosing.screen import propose, shape_starts
+from thsa_cosim.diagnosis.choosing.selection import RIVAL_SHARE, RIVAL_WORTH, Selection
 from thsa_cosim.diagnosis.choosing.spread import between_models
 from thsa_cosim.diagnosis.fitting.bench import Bench
-from thsa_cosim.diagnosis.fitting.fit import Fit
+from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.diagnosis.fitting.uncertainty import standard_errors
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns
+from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 
 SEEDS = 20
 HESS_SOOM = {"motorEffect.hessSoom.dF": 0.6, "motorEffect.hessSoom.v_S": 4.0}
@@ -373,3 +381,36 @@ def test_of_each_rival_the_first_fit_is_tried_once_and_the_next_one_after_it(mon
     others = (rival("d", effect="d:motor"), rival("a"), rival("g"), rival("e", effect="e:motor"))
     assert rivals.forms(*others, offered=offered) == ["b", "f"]
     assert rivals.asked == ["a", "e"]
+
+
+@pytest.mark.parametrize("stays", ["", "its shape is known", "it leaves nothing"])
+def test_a_fit_whose_shape_is_not_known_to_within_itself_is_tried_from_the_other_starts(stays: str):
+    """A Stribeck speed that went to the end of its range leaves more than the start on the right side leads to."""
+    offered = tuple(c for c in candidates("stribeck") if c.slot.name == "motor" and not c.variant.instead)
+    true = {"motorEffect.stribeck.dF": 0.6, "motorEffect.stribeck.v_S": 4.0, "motorEffect.stribeck.n": 1.0}
+    own = bench(offered, true, 3, held_shapes(offered))
+    base = refine(own, unknowns(), unknowns().start)
+    assert base is not None
+    (held,) = own.residuals(base.unknowns, base.vector[None, :], "validate")
+    assert held is not None
+    selection = Selection(own, ChannelWeights(own), base, held, lambda _: None)
+    selection.weights.base_held = held
+    rows = [(offered[0], shapes) for shapes in shape_starts(offered[0], {}, {})]
+    best, *_ = selection.fitted(propose(own, base, rows))
+    k = best.fit.unknowns.names.index("motorEffect.stribeck.v_S")
+    vector, jacobian = best.fit.vector.copy(), best.fit.jacobian.copy()
+    vector[k] = best.fit.unknowns.members[k].upper
+    if stays != "its shape is known":
+        jacobian[:, k] = 0.0
+    left = best.validate if stays == "it leaves nothing" else held
+    ended = replace(
+        best,
+        validate=left,
+        fit=replace(best.fit, vector=vector, own=jacobian, shared=None, cost=100.0 * best.fit.cost),
+    )
+    found = from_other_starts(selection, ended)
+    if stays:
+        assert found is ended
+    else:
+        assert found.fit.cost <= best.fit.cost
+        assert found.fit.vector[k] == pytest.approx(4.0, rel=0.2)

@@ -23,12 +23,14 @@ class Stages:
         self.asked: dict[str, Any] = {}
         self.better: Any = None
         self.form: Any = None
+        self.started: Any = None
         self.others: list[Any] = []
         self.bench = SimpleNamespace(factors=lambda part: np.full(3, {"fit": 2.0}[part]))
         self.current = object()
         monkeypatch.setattr(room, "screen", self.screen)
         monkeypatch.setattr(room, "largest_gains", self.largest_gains)
         monkeypatch.setattr(room, "threshold", lambda gains: float(gains[0]))
+        monkeypatch.setattr(room, "from_other_starts", self.from_other_starts)
         monkeypatch.setattr(room, "best_form", self.best_form)
         monkeypatch.setattr(room, "rivals_forms", self.rivals_forms)
 
@@ -75,6 +77,10 @@ class Stages:
     def overtaking(self, choice: Any, scored: Any) -> Any:
         self.asked["overtaking"] = (choice, list(scored))
         return self.better
+
+    def from_other_starts(self, selection: Any, choice: Any) -> Any:
+        assert selection is self
+        return self.started or choice
 
     def best_form(self, selection: Any, choice: Any, scored: Any, proposals: Any, offered: Any) -> Any:
         assert selection is self
@@ -164,6 +170,10 @@ def test_what_takes_over_comes_first_and_the_others_are_told_why(monkeypatch: py
     assert found.accepted is own
     assert found.proposals == (own.proposal, s.first, s.second), "it was never screened"
     assert found.scored[:2] == (own, s.one)
+    s.started, s.form = own, None
+    found = s.round()
+    assert s.asked["rivals_forms"][0] is own
+    assert (found.accepted, found.scored[:2]) == (own, (own, s.one))
 
 
 def test_parts_of_an_effect_have_no_rivals_and_no_further_starts(monkeypatch: pytest.MonkeyPatch):

@@ -10,7 +10,7 @@ from itertools import zip_longest
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
-from thsa_cosim.diagnosis.choosing.forms import best_form, rivals_forms
+from thsa_cosim.diagnosis.choosing.forms import best_form, from_other_starts, rivals_forms
 from thsa_cosim.diagnosis.choosing.gates import SMALLEST_STRUCTURE
 from thsa_cosim.diagnosis.choosing.needless import further_parts, prune, within_range
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine
@@ -374,6 +374,7 @@ def _round(
     forms: tuple[Scored, ...] = ()
     if choice is not None and deep and whole:
         first = choice
+        choice = from_other_starts(selection, choice)
         scored += rivals_forms(selection, choice, scored, proposals, offered)
         choice = selection.overtaking(choice, scored) or choice
         choice, forms = best_form(selection, choice, scored, proposals, offered)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
-from thsa_cosim.diagnosis.choosing.curves import along_exponents
+from thsa_cosim.diagnosis.choosing.curves import WHOLE, along_exponents
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, insignificant, out_of_range
 from thsa_cosim.diagnosis.choosing.score import Scored, polish
 from thsa_cosim.diagnosis.choosing.screen import Proposal, propose, shape_starts
@@ -44,6 +44,26 @@ def best_form(
             best = one
     alike = [s for s in (choice, *forms) if s is not best and _lead(selection, best, s) < SIGMAS]
     return best, tuple(alike)
+
+
+def from_other_starts(selection: Selection, choice: Scored) -> Scored:
+    """``choice``, or a better fit of it from another start, where it leaves structure and knows a positive shape not to
+    within itself.
+
+    From a start that is far off, a time constant or a width may leave the range on the wrong side of a hill, whatever
+    the response there had promised.
+    """
+    fit = choice.fit
+    names = [p.variable for p in choice.candidate.shapes if p.lower > 0.0 and not p.scanned]
+    own = fit.unknowns.index([name for name in names if name in fit.unknowns.names])
+    unknown = fit.stderr(fit.inflation)[own] > fit.vector[own]
+    if not (unknown.any() and selection.is_open([choice])):
+        return choice
+    rows = [(choice.candidate, starts) for starts in shape_starts(choice.candidate, {}, {})]
+    proposals = propose(selection.bench, selection.current, rows)
+    others = [p for p in proposals if p.shapes != choice.proposal.shapes]
+    fits = [selection.polished(s) for s in selection.fitted(others)[:WHOLE]]
+    return min([choice, *fits], key=lambda s: s.fit.cost)
 
 
 def rivals_forms(

@@ -47,17 +47,17 @@ def best_form(
 
 
 def from_other_starts(selection: Selection, choice: Scored) -> Scored:
-    """``choice``, or a better fit of it from another start, where it leaves structure and knows a positive shape not to
-    within itself.
+    """``choice``, or a better fit of it from another start, where it leaves structure and a positive shape is unknown.
 
     From a start that is far off, a time constant or a width may leave the range on the wrong side of a hill, whatever
-    the response there had promised.
+    the response there had promised. Unknown: the standard error is above the value.
     """
+    if not selection.is_open([choice]):
+        return choice
     fit = choice.fit
-    names = [p.variable for p in choice.candidate.shapes if p.lower > 0.0 and not p.scanned]
-    own = fit.unknowns.index([name for name in names if name in fit.unknowns.names])
-    unknown = fit.stderr(fit.inflation)[own] > fit.vector[own]
-    if not (unknown.any() and selection.is_open([choice])):
+    positive = {p.variable for p in choice.candidate.shapes if p.lower > 0.0 and not p.scanned}
+    own = [k for k, name in enumerate(fit.unknowns.names) if name in positive]
+    if not (fit.stderr(fit.inflation)[own] > fit.vector[own]).any():
         return choice
     rows = [(choice.candidate, starts) for starts in shape_starts(choice.candidate, {}, {})]
     proposals = propose(selection.bench, selection.current, rows)

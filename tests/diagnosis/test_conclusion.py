@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from diagnosis.analytic import candidates
+from thsa_cosim.diagnosis.choosing.in_step import NOTE as IN_STEP
 from thsa_cosim.diagnosis.conclusion import WORTH, Conclusion, note_on_no_law
 
 
@@ -33,6 +34,8 @@ def test_what_falls_over_the_speed_is_what_makes_it_stick(effect: str, values: d
     at = {p.variable: values[p.name] for p in one.parameters if p.name in values}
     final = SimpleNamespace(unknowns=SimpleNamespace(named=lambda _vector: at), vector=np.zeros(0))
     asked: Any = SimpleNamespace(
-        found=SimpleNamespace(accepted=(SimpleNamespace(candidate=one),), final=final)
+        found=SimpleNamespace(accepted=(SimpleNamespace(candidate=one),), final=final, notes=("other",))
     )
     assert Conclusion._sticking(asked) == (one.name if effect == "stribeck" else "")
+    asked.found.notes = ("other", IN_STEP)
+    assert Conclusion._sticking(asked) == one.name, "or what was found in step"

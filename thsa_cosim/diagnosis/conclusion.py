@@ -25,6 +25,7 @@ from thsa_cosim.diagnosis.choosing.findings import (
     values_of,
 )
 from thsa_cosim.diagnosis.choosing.hidden import hidden_parts, notes_on_hidden, widening
+from thsa_cosim.diagnosis.choosing.in_step import NOTE as IN_STEP
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.choosing.spread import between_models
@@ -179,7 +180,12 @@ class Conclusion:
         )
 
     def _sticking(self) -> str:
-        """The name of an effect that was found whose law falls over the speed, "" if there is none."""
+        """The name of an effect that makes the machine stick and slip, "" if there is none.
+
+        It was found in step, or its law falls over the speed.
+        """
+        if IN_STEP in self.found.notes:
+            return next((s.candidate.name for s in self.found.accepted), "")
         values = self.found.final.unknowns.named(self.found.final.vector)
         return next((s.candidate.name for s in self.found.accepted if falls(s.candidate, values)), "")
 

@@ -140,6 +140,10 @@ STEADY: dict[str, tuple[dict[str, float], Callable[[Rig], float]]] = {
         {"torqueEffect.torqueConstantSaturation.a": 2e-3, "torqueEffect.torqueConstantSaturation.b": 1e-3},
         lambda r: brentq(lambda i: r.K_t * (1.0 - 2e-3 * i**2 - 1e-3 * i) * i - torque(r), 0.0, 10.0),
     ),
+    "torque-constant-saturation, as a fraction": (
+        {"torqueEffect.froelichSaturation.a": 2e-3, "torqueEffect.froelichSaturation.b": 1e-3},
+        lambda r: brentq(lambda i: r.K_t * i / (1.0 + 2e-3 * i**2 + 1e-3 * i) - torque(r), 0.0, 20.0),
+    ),
     "current-sensor-gain": (
         {"currentSensorEffect.sensorGain.g": 0.03},
         lambda r: 1.03 * torque(r) / r.K_t,

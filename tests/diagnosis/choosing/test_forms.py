@@ -274,6 +274,12 @@ def test_a_form_of_the_same_block_is_fitted_from_the_optimum_of_the_choice(forms
     assert [(s.candidate.key[-1], *s.fit.vector) for s in forms.started] == [("a", 1.0, 2.0), ("b", 1.0, 6.0)]
 
 
+def test_a_form_that_cannot_be_simulated_at_that_optimum_stays_as_it_was(forms: Forms):
+    choice, wider = form("c", component="x", vector=[1.0, 2.0]), form("a", 90.0, component="x")
+    best, _ = best_form(forms, choice, [choice, wider], [], [])  # type: ignore[arg-type]
+    assert best is wider, "not with the choice's values beside its own residuals"
+
+
 def test_a_form_of_another_block_is_fitted_once_with_all_parameters(
     forms: Forms, monkeypatch: pytest.MonkeyPatch
 ):

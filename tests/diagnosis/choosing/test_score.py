@@ -217,6 +217,26 @@ def test_it_starts_from_the_share_of_the_promise_that_serves_best(monkeypatch: p
         assert started.pop() == pytest.approx(start, rel=1e-6)
 
 
+@pytest.mark.parametrize(("gained", "asked"), [(0.5, 1), (0.49, 3), (None, 3)])
+def test_smaller_shares_are_tried_where_the_whole_promise_gains_less_than_half_of_itself(
+    monkeypatch: pytest.MonkeyPatch, gained: float | None, asked: int
+):
+    current = fit(2.0, 9.0, 900.0)
+    promised = replace(proposed(2e-3), gain=0.1 * current.misfit)
+    left = None if gained is None else np.sqrt((current.misfit - gained * promised.gain) / SAMPLES)
+    tried: list[np.ndarray] = []
+
+    def simulated(unknowns: Unknowns, vectors: np.ndarray, part: str) -> Any:
+        begun = not tried
+        tried.extend(vectors)
+        return [None if begun and left is None else np.full(SAMPLES, left or 3.0)] * len(vectors)
+
+    monkeypatch.setattr(room, "refine", lambda *_given, **_more: None)
+    bench: Any = SimpleNamespace(residuals=simulated)
+    assert score(bench, current, HELD, promised) is None
+    assert len(tried) == asked
+
+
 def test_the_best_start_s_residuals_are_kept_and_only_the_new_column_is_taken(
     monkeypatch: pytest.MonkeyPatch,
 ):
@@ -227,8 +247,9 @@ def test_the_best_start_s_residuals_are_kept_and_only_the_new_column_is_taken(
     tried: list[np.ndarray] = []
 
     def simulated(unknowns: Unknowns, vectors: np.ndarray, part: str) -> Any:
+        first = len(tried)
         tried.extend(vectors)
-        return residuals
+        return residuals[first : len(tried)]
 
     bench: Any = SimpleNamespace(residuals=simulated)
     asked: dict[str, Any] = {}

@@ -11,7 +11,13 @@ from thsa_cosim.diagnosis.catalogue.candidate import candidates_of
 from thsa_cosim.diagnosis.catalogue.known import known_effects
 from thsa_cosim.diagnosis.catalogue.slots import Slot
 from thsa_cosim.diagnosis.choosing import selection as room
-from thsa_cosim.diagnosis.choosing.selection import Selection, other_places, other_waves, worth_refining
+from thsa_cosim.diagnosis.choosing.selection import (
+    Selection,
+    other_laws,
+    other_places,
+    other_waves,
+    worth_refining,
+)
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns, unknowns_of
 
 
@@ -82,6 +88,22 @@ def test_ripples_at_other_wave_numbers_are_those_that_promise_a_tenth_of_the_bes
     assert other_waves(made, refined) == [made[0], made[3]]
     assert other_waves([], refined) == []
     assert len(other_waves([ripple(100.0 - k) for k in range(20)], [])) == room.WAVES
+
+
+def test_a_law_that_was_left_out_of_an_effect_that_was_refined_has_its_best_start():
+    def law(effect: str, key: str, gain: float) -> Any:
+        own = proposal(effect, gain)
+        own.candidate.key = key
+        return own
+
+    wave, rise, ramp, other = (law("a", key, gain) for key, gain in zip("wrlx", (100.0, 30.0, 9.9, 90.0)))
+    made = [wave, law("a", "w", 95.0), other, law("b", "b", 80.0), rise, law("a", "r", 20.0), ramp]
+    refined: Any = [SimpleNamespace(candidate=p.candidate) for p in (wave, other)]
+    assert other_laws(made, refined) == [rise], "of no other effect, and nothing that promises little"
+    assert other_laws(made, []) == []
+    assert other_laws([], refined) == []
+    many = [law("a", f"k{k}", 100.0 - k) for k in range(20)]
+    assert len(other_laws(many, refined)) == room.LAWS
 
 
 N = 4000

@@ -48,11 +48,13 @@ def test_the_truth_leaves_what_noise_does_however_the_signals_are_weighed():
 
 def test_there_is_a_window_for_each_half_of_its_length_and_signal():
     own = bench((), {}, 3)
-    (found,) = Spectra(own).residuals(unknowns(), unknowns().start[None, :], "fit")
+    compared = Spectra(own)
+    (found,) = compared.residuals(unknowns(), unknowns().start[None, :], "fit")
     assert found is not None
     length = round(SECONDS / (TIME[1] - TIME[0]))
     windows = 1 + (TIME.size - length) // (length // 2)
     assert found.size == 2 * windows * (length // 2 + 1)
+    assert compared.size("fit") == found.size
 
 
 def test_a_signal_shorter_than_a_window_is_one_window():

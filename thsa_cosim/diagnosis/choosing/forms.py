@@ -100,7 +100,8 @@ def _polished(selection: Selection, one: Scored, choice: Scored) -> Scored:
     values = {**one.fit.unknowns.named(one.fit.vector), **choice.fit.unknowns.named(choice.fit.vector)}
     vector = np.array([values[name] for name in one.fit.unknowns.names])
     start = replace(one, fit=replace(one.fit, vector=vector))
-    return polish(selection.bench, start, selection.current, selection.held)
+    made = polish(selection.bench, start, selection.current, selection.held)
+    return one if made is start else made  # that optimum cannot be simulated with it
 
 
 def criterion(one: Scored, inflation: float) -> float:

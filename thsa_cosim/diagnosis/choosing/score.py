@@ -8,7 +8,7 @@ import numpy as np
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.bench import Bench
-from thsa_cosim.diagnosis.fitting.fit import Fit, refine
+from thsa_cosim.diagnosis.fitting.fit import FORESEEN, Fit, refine
 from thsa_cosim.diagnosis.fitting.structure import block_squares, consistency, relative_consistency, structure
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
 from thsa_cosim.signals import FloatArray
@@ -17,6 +17,8 @@ from thsa_cosim.signals import FloatArray
 ENOUGH = 1.05
 #: What leaves less than this many times the squares of the noise leaves little beside it.
 LITTLE = 2.0
+#: Shares of the promised amplitudes that are tried where these gain less than FORESEEN of what they promised.
+SHARES = (0.3, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +62,18 @@ def score(
     }
     start = unknowns.start
     start[: current.vector.size] = current.vector
-    trials = []
-    for share in (1.0, 0.3, 0.1):
+
+    def at(share: float) -> FloatArray:
         trial = start.copy()
         for variable, value in amplitude.items():
             trial[members.index(variable)] += share * value
-        trials.append(unknowns.clip(trial))
-    found = bench.residuals(unknowns, np.array(trials), "fit")
+        return unknowns.clip(trial)
+
+    trials = [at(1.0)]
+    found = bench.residuals(unknowns, trials[0][None, :], "fit")
+    if found[0] is None or current.misfit - float(found[0] @ found[0]) < FORESEEN * proposal.gain:
+        trials += [at(share) for share in SHARES]
+        found += bench.residuals(unknowns, np.array(trials[1:]), "fit")
     costs = [np.inf if r is None else float(r @ r) for r in found]
     best = int(np.argmin(costs))
     residual = found[best]

@@ -48,8 +48,8 @@ RIVAL_WORTH = 0.3
 #: what the first one's parameters have taken up of it counts for it as well.
 HALF = 0.5
 
-#: Ripples at so many other wave numbers are refined where no fit leaves nothing.
-WAVES = 6
+#: Ripples at so many other wave numbers are refined where no fit leaves nothing, and so many other laws.
+WAVES, LAWS = 6, 4
 #: A further start is refined if it promises this much more than the candidate's starts before.
 BETTER = 1.05
 
@@ -162,6 +162,22 @@ def other_waves(proposals: Sequence[Proposal], scored: Sequence[Scored]) -> list
     ][:WAVES]
 
 
+def other_laws(proposals: Sequence[Proposal], scored: Sequence[Scored]) -> list[Proposal]:
+    """The best start among ``proposals`` (best first) of every law that was left out of an effect that was refined.
+
+    Of friction along the stroke, starts of a wave may have left none for a local rise.
+    """
+    known = {s.candidate.key for s in scored}
+    effects = {s.candidate.effect.name for s in scored}
+    best = proposals[0].gain if proposals else 0.0
+    found: dict[str, Proposal] = {}
+    for p in proposals:
+        is_left_out = p.candidate.effect.name in effects and p.candidate.key not in known
+        if is_left_out and p.gain >= PROMISING * best:
+            found.setdefault(p.candidate.key, p)
+    return list(found.values())[:LAWS]
+
+
 @dataclass(frozen=True, eq=False)
 class Selection:
     """A round against the model so far: its fit ``current`` and its held-out residuals ``held`` (N,)."""
@@ -211,13 +227,13 @@ class Selection:
         further: Sequence[Proposal],
         limit: float,
     ) -> list[Scored]:
-        """``scored`` and what is worth it of ``further`` starts and other wave numbers, fitted; best first."""
+        """``scored`` and what is worth it of ``further`` starts, other laws and wave numbers, fitted; best first."""
         before: dict[str, float] = {}
         for p in proposals:
             before[p.candidate.key] = max(before.get(p.candidate.key, 0.0), p.gain)
         better = worth_refining([p for p in further if p.gain > BETTER * before[p.candidate.key]], limit)
-        better = each_start_once(better)
-        chosen = sorted([*better, *other_waves(proposals, scored)], key=lambda p: -p.gain)
+        others = [*other_laws(proposals, scored), *other_waves(proposals, scored)]
+        chosen = sorted(each_start_once([*better, *others]), key=lambda p: -p.gain)
         found = sorted([*scored, *self.fitted(chosen)], key=lambda s: -s.held_out_gain)
         return simplest_first(found, self._ties)
 

@@ -19,6 +19,8 @@ from thsa_cosim.signals import FloatArray, Signals
 
 #: Where a start cannot be simulated, so many vectors beside it are tried, within this share of the ordinary changes.
 TRIES, NEAR = 4, 1e-3
+#: Iterations from a start, and from one where the search has ended: what its own did not reach, these do not.
+ITERATIONS, SEARCHED = 12, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +78,8 @@ def identify_model(
 ) -> Identified:
     """Identify ``unknowns`` of an FMU on the fit recordings from every one of ``starts``; the best fit counts.
 
-    ``near``: a fit of the same unknowns in an equal model, without weights, whose Jacobian leads the way.
+    ``near``: a fit of the same unknowns in an equal model, without weights, whose Jacobian leads the way; every start
+    but the first one is where a search has ended.
     StudyError if the FMU cannot be simulated at any start.
     """
     own = with_fmu(trials, fmu)
@@ -106,7 +109,7 @@ def identify_model(
                 jacobian=jacobian,
                 steps=steps,
                 near=jacobian is not None,
-                iterations=12,
+                iterations=SEARCHED if near is not None and number else ITERATIONS,
                 to_beat=rest,
             )
             fits += [] if fit is None else [fit]

@@ -43,6 +43,10 @@ class Spectra:
         """Root mean square of what noise leaves: 1, since nothing is weighed."""
         return 1.0
 
+    def size(self, part: Part) -> int:
+        """How many magnitudes are compared, once some were."""
+        return sum(magnitudes.size for _, _, magnitudes in self._measured[part])
+
     def _apart(self, residual: FloatArray, part: Part) -> FloatArray:
         """(K,) simulated less measured magnitudes, of the residuals (N,) of all signals."""
         if part not in self._measured:

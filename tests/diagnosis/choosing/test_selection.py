@@ -96,7 +96,12 @@ def test_a_law_that_was_left_out_of_an_effect_that_was_refined_has_its_best_star
         own.candidate.key = key
         return own
 
-    wave, rise, ramp, other = (law("a", key, gain) for key, gain in zip("wrlx", (100.0, 30.0, 9.9, 90.0)))
+    wave, other, rise, ramp = (
+        law("a", "w", 100.0),
+        law("a", "x", 90.0),
+        law("a", "r", 30.0),
+        law("a", "l", 9.9),
+    )
     made = [wave, law("a", "w", 95.0), other, law("b", "b", 80.0), rise, law("a", "r", 20.0), ramp]
     refined: Any = [SimpleNamespace(candidate=p.candidate) for p in (wave, other)]
     assert other_laws(made, refined) == [rise], "of no other effect, and nothing that promises little"

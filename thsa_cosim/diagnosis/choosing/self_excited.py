@@ -45,10 +45,10 @@ MOVES, HALF, SHARE = (0.01, 0.9), 0.5, 0.1
 #: After so many rounds the forms go on that leave no more than so many times the least of all; after as many more only
 #: the best does. Set while looking at three simulated units: the true form was ahead by 3 to 60 % after five rounds.
 ROUNDS, ALIKE = 5, 1.1
-#: The way is given up where all of them leave more than so many variances of the spectra's noise after the first and the
-#: second of these rounds: something else is missing, or the form is none of them. Set while looking at nine simulated
-#: units: 1.8 and 1.7 to 1.8 where it led to the machine, 2.5 to 4 and 2.9 to 3.3 where it ended beside it, 18 to 51
-#: after the first with another friction or beside a second effect.
+#: The way is given up where all of them leave more than so many variances of the spectra's noise after the first and
+#: the second of these rounds: something else is missing, or the form is none of them. Set while looking at nine
+#: simulated units: 1.8 and 1.7 to 1.8 where it led to the machine, 2.5 to 4 and 2.9 to 3.3 where it ended beside it, 18
+#: to 51 after the first with another friction or beside a second effect.
 LOST = (10.0, 2.5)
 #: In step nothing else is missing if no signal leaves more than this many standard deviations of its noise. Set while
 #: looking at the same: 1.00 to 1.015 with nothing else, from 1.06 on with a wrong effect.

@@ -12,7 +12,7 @@ from thsa_cosim.diagnosis.choosing import ripples as room
 from thsa_cosim.diagnosis.choosing.attribution import Attribution, attribute
 from thsa_cosim.diagnosis.choosing.findings import found_effects
 from thsa_cosim.diagnosis.choosing.orders import Machine
-from thsa_cosim.diagnosis.choosing.ripples import freed, on_orders
+from thsa_cosim.diagnosis.choosing.ripples import first_free_orders, freed, on_orders
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
@@ -47,6 +47,22 @@ def test_an_integer_order_is_given_and_not_fitted():
     free = diagnosed(12.0, Machine({}, {}))
     (alone,) = found_effects(free, free.final)
     assert alone.parameters["n"].stderr > 0.0, "of a machine of which nothing is known the order is fitted"
+
+
+def test_of_further_orders_which_are_alike_the_first_free_one_is_offered():
+    offered = [c for c in candidates("cogging", "stribeck") if c.slot.name == "motor"]
+    (first, second, third) = (c for c in offered if any(p.name.startswith("n_") for p in c.shapes))
+    main = next(c for c in offered if not c.variant.beside and any(p.scanned for p in c.shapes))
+
+    def left_out(*known: Any) -> list[Any]:
+        names = tuple(p.variable for c in (main, *known) for p in c.parameters)
+        model: Any = SimpleNamespace(unknowns=SimpleNamespace(names=names))
+        found = first_free_orders(offered, model)
+        return [c for c in offered if c not in found]
+
+    assert left_out() == [second, third], "the second harmonic of the order that is there is none of them"
+    assert left_out(first) == [third]
+    assert left_out(first, second, third) == []
 
 
 def test_an_order_that_is_no_integer_is_fitted_where_the_integer_leaves_structure():

@@ -15,7 +15,7 @@ from thsa_cosim.diagnosis.choosing.gates import SMALLEST_STRUCTURE
 from thsa_cosim.diagnosis.choosing.needless import further_parts, prune, within_range
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine
 from thsa_cosim.diagnosis.choosing.places import tied_places
-from thsa_cosim.diagnosis.choosing.ripples import freed, on_orders
+from thsa_cosim.diagnosis.choosing.ripples import first_free_orders, freed, on_orders
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
 from thsa_cosim.diagnosis.choosing.selection import Say, Selection
@@ -218,7 +218,7 @@ def attribute(
         while offered:
             selection = Selection(bench, weights, current, current_held, say)
             free = [c for c in offered if not any(_is_taken(c, s.candidate) for s in accepted)]
-            left = [c for c in free if not _is_known(c, current)]
+            left = first_free_orders([c for c in free if not _is_known(c, current)], current)
             own = seed + len(rounds)
             screened = _screened(selection, left, scan(current), own, machine, least)
             if not rounds and selection.is_open(screened.scored):

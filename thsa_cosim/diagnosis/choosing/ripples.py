@@ -7,6 +7,7 @@ that may also move the order misses it: a small change of the order makes up for
 from collections.abc import Sequence
 from dataclasses import replace
 
+from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing.gates import NEXT_SHARE, SIGMAS, out_of_range
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored
@@ -19,6 +20,21 @@ from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency, str
 from thsa_cosim.diagnosis.fitting.unknowns import Unknowns, unknowns_of
 from thsa_cosim.diagnosis.fitting.weights import ChannelWeights
 from thsa_cosim.signals import FloatArray
+
+
+def first_free_orders(candidates: Sequence[Candidate], current: Fit) -> list[Candidate]:
+    """``candidates``, of the further orders of a ripple only the first that is not in the model: they are alike."""
+    found: list[Candidate] = []
+    offered: set[tuple[str, str]] = set()
+    for c in candidates:
+        is_new = any(p.scanned and p.variable not in current.unknowns.names for p in c.shapes)
+        if c.variant.beside and is_new:
+            place = (c.slot.name, c.component)
+            if place in offered:
+                continue
+            offered.add(place)
+        found.append(c)
+    return found
 
 
 def on_orders(proposals: Sequence[Proposal], machine: Machine, current: Fit) -> list[Proposal]:

@@ -117,7 +117,8 @@ def _diagnose(
         scan = wave_number_finder(bench, tested.slots, signals_at, machine)
         slots = () if isinstance(tested, BlackBox) else tested.filled
         with Following(bench, slots, signals_at, opening) as following:
-            in_step = InStep(bench, following, unknowns, tested.candidates, scan, machine, scenario.seed, say)
+            ways = (bench, following, unknowns, tested.candidates, scan, machine, scenario.seed, say)
+            self_excited = SelfExcited(*ways)
             found = attribute(
                 bench,
                 unknowns,
@@ -127,8 +128,9 @@ def _diagnose(
                 seed=scenario.seed,
                 most=spec.most,
                 machine=machine,
-                stuck=in_step.found,
-                continued=SelfExcited(bench, following, tested.candidates, scenario.seed, say).continued,
+                stuck=InStep(*ways).found,
+                continued=self_excited.continued,
+                rough=self_excited.is_for,
                 say=say,
             )
     # What the search found at a finer tolerance is judged at no coarser one.

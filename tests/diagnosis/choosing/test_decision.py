@@ -221,9 +221,13 @@ def test_two_effects_are_found_one_after_the_other():
     for number, one in enumerate(found.rounds):
         gains = [p.gain for p in one.proposals]
         assert gains == sorted(gains, reverse=True)
-        assert all((p.response.size > 0) is (number == 0) for p in one.proposals), (
+        refined = {id(r.proposal) for r in (*one.scored, *one.rivals)}
+        assert all((p.response.size > 0) is (number == 0 or id(p) in refined) for p in one.proposals), (
             "the first ones are compared"
         )
+    second = [j for j in judged(found) if j.round == 2]
+    assert second[0].name == found.accepted[1].candidate.name
+    assert second[0].decision == "accepted"
     assert {p.candidate.name for p in found.rounds[1].proposals} < {
         p.candidate.name for p in found.rounds[0].proposals
     }

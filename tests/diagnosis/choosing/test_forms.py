@@ -167,6 +167,7 @@ class Forms:
         self.known: dict[str, Any] = {}
         self.promised: list[Any] = []
         self.weak: set[str] = set()
+        self.continued: set[str] = set()
         self.ended: set[int] = set()
         monkeypatch.setattr(room, "_lead", self.lead)
         monkeypatch.setattr(room, "insignificant", lambda s: "weak" if s.candidate.key in self.weak else "")
@@ -180,7 +181,10 @@ class Forms:
         assert selection is self
         return self.leads.get((one.candidate.key[-1], other.candidate.key[-1]), 0.0)
 
-    def polish(self, bench: Any, one: Any, current: Any, held: Any) -> Any:
+    def rough(self, one: Any) -> bool:
+        return one.candidate.key in self.continued
+
+    def polish(self, bench: Any, one: Any, current: Any, held: Any, _rough: bool = False) -> Any:
         assert (bench, current, held) == (self.bench, self.current, self.held)
         self.started.append(one)
         return one
@@ -219,6 +223,13 @@ def test_the_form_with_the_best_criterion_takes_over_and_the_others_are_as_likel
     assert forms.best(choice, form("a", 90.0), form("b", 80.0)) == ("b", ["c", "a"])
     assert forms.best(choice, form("a", 100.0)) == ("c", ["a"]), "no better: the first stays"
     assert forms.best(choice) == ("c", [])
+
+
+def test_what_is_gone_on_from_in_another_way_keeps_its_form(forms: Forms):
+    choice = form("c")
+    forms.continued.add(choice.candidate.key)
+    assert forms.best(choice, form("a", 90.0)) == ("c", [])
+    assert forms.curves == []
 
 
 def test_the_best_one_is_compared_first(forms: Forms):

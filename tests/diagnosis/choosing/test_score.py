@@ -11,6 +11,7 @@ from diagnosis.analytic import DECLARED, bench, candidates, unknowns
 from thsa_cosim.diagnosis.choosing import score as room
 from thsa_cosim.diagnosis.choosing.score import (
     ENOUGH,
+    ROUGH,
     Scored,
     extended_unknowns,
     fixed_shapes,
@@ -75,7 +76,16 @@ def test_a_fit_down_to_the_noise_is_polished_once_from_where_it_is(fits: Any):
     assert given[0] is bench
     assert given[1] is choice.fit.unknowns
     assert given[2] is choice.fit.vector
-    assert more == {"steps": choice.fit.steps}
+    assert more == {"steps": choice.fit.steps, "iterations": 8}
+
+
+def test_what_is_gone_on_from_in_another_way_is_fitted_roughly_whatever_it_leaves(fits: Any):
+    choice = scored(fit(2.0, 3.0, 300.0))
+    bench: Any = object()
+    fits.queue = [fit(2.1, 9.0 * ENOUGH, 100.0)]
+    assert polish(bench, choice, choice.fit, HELD, rough=True).fit.vector[0] == 2.1
+    ((_given, more),) = fits.asked
+    assert more == {"steps": choice.fit.steps, "iterations": ROUGH}
 
 
 @pytest.mark.parametrize(("costs", "expected"), [((150.0, 120.0), 1.5), ((120.0, 150.0), 2.1)])

@@ -151,8 +151,8 @@ def left_in_the_fit(own: Any, residual: np.ndarray) -> Any:
 @pytest.fixture
 def selection(monkeypatch: pytest.MonkeyPatch) -> Selection:
     """A round whose candidates are fitted already."""
-    monkeypatch.setattr(room, "polish", lambda bench, one, current, held: one)
-    monkeypatch.setattr(room, "go_on", lambda bench, one, current, held: one)
+    monkeypatch.setattr(room, "polish", lambda bench, one, *_given: one)
+    monkeypatch.setattr(room, "go_on", lambda bench, one, *_given: one)
     roles = {"fit": TRIALS, "validate": TRIALS}
     bench: Any = SimpleNamespace(
         of=roles.__getitem__, factors={"fit": np.ones(N)}.__getitem__, level=lambda _: 1.0
@@ -300,7 +300,7 @@ def test_what_reaches_nine_tenths_of_the_gain_is_fitted_with_all_parameters_to_b
 ):
     polished = []
     monkeypatch.setattr(
-        room, "polish", lambda bench, one, current, held: polished.append(one.candidate.name) or one
+        room, "polish", lambda bench, one, *_given: polished.append(one.candidate.name) or one
     )
     winner, just, less = scored("a", 0.0), scored("b", 0.0), scored("c", 0.0)
     winner.held_out_gain, just.held_out_gain, less.held_out_gain = 100.0, 90.0, 89.9
@@ -556,7 +556,7 @@ def test_another_shaft_whose_fit_did_not_find_its_way_starts_from_the_winner_to_
     winner, lost, foreign = scored("a", 0.0), scored("a", 0.5, "gear"), scored("b", 0.5)
     monkeypatch.setattr(room, "geared", lambda one, other: other if other is lost else None)
     monkeypatch.setattr(
-        room, "polish", lambda bench, one, current, held: scored("a", 0.0, "gear") if one is lost else one
+        room, "polish", lambda bench, one, *_given: scored("a", 0.0, "gear") if one is lost else one
     )
     assert names(selection.rivals(winner, [winner, lost, foreign], ())) == ["a:gear"]
     assert names(selection.rivals(winner, [foreign, winner, lost], ())) == ["a:gear"], "in whatever order"

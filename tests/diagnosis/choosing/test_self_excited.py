@@ -11,7 +11,8 @@ import pytest
 from diagnosis.analytic import bench, candidates, unknowns
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing import self_excited as room
-from thsa_cosim.diagnosis.choosing.attribution import IS_ALL, Continued, Judged, attribute
+from thsa_cosim.diagnosis.choosing.attribution import IS_ALL, NO_MORE, Continued, Judged, attribute
+from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE
 from thsa_cosim.diagnosis.choosing.score import held_shapes, polish, score
 from thsa_cosim.diagnosis.choosing.screen import propose
 from thsa_cosim.diagnosis.choosing.self_excited import TOLERANCE, SelfExcited
@@ -48,15 +49,18 @@ class Following:
 
     def beside_signal(self, gain: float) -> Bench:
         self.asked.append(gain)
-        return self.own
+        return self._copy()
 
     def at(self, gain: float) -> Bench:
-        return self.own
+        return self._copy()
 
     def finer(self, tolerance: float) -> Bench:
         assert tolerance == TOLERANCE
-        self.fine.append(self.own.beside(self.own._engine._runner, self.own.trials, {}))
+        self.fine.append(self._copy())
         return self.fine[-1]
+
+    def _copy(self) -> Bench:
+        return self.own.beside(self.own._engine._runner, self.own.trials, {})
 
 
 def stuck(
@@ -92,6 +96,10 @@ def at(own: Bench, fit: Fit, vector: np.ndarray) -> Fit:
     return replace(fit, vector=vector, residual=residual, cost=float(residual @ residual + prior @ prior))
 
 
+def way(own: Bench, following: Following, offered: Sequence[Candidate] = ()) -> SelfExcited:
+    return SelfExcited(own, following, unknowns(), offered, lambda _: {}, NO_MACHINE, 1, lambda _: None)  # type: ignore[arg-type]
+
+
 def continued(
     own: Bench,
     weights: ChannelWeights,
@@ -99,7 +107,7 @@ def continued(
     following: Following,
     offered: Sequence[Candidate] = (),
 ) -> Any:
-    return SelfExcited(own, following, offered, 1, lambda _: None).continued(weights, found)  # type: ignore[arg-type]
+    return way(own, following, offered).continued(weights, found)
 
 
 def test_a_better_fit_comes_from_step_by_spectra_and_is_gone_on_with_at_a_finer_tolerance():
@@ -208,22 +216,108 @@ def test_where_the_new_weights_lead_it_astray_the_fit_stays_as_it_was_found(monk
     assert own.weights == before
 
 
+DRAG = {f"motorEffect.windage.{name}": x for name, x in (("b_q", 1.5e-3), ("n", 2.0), ("v_r", 30.0))}
+
+
+def with_drag() -> tuple[Bench, ChannelWeights, Judged, tuple[Candidate, ...]]:
+    """A Stribeck friction that was accepted alone, of a machine with a drag beside it."""
+    offered = tuple(c for c in candidates("stribeck", "windage") if c.slot.name == "motor")
+    own = bench(offered, {**CURVE, **DRAG}, 3, held_shapes(offered))
+    _own, _weights, (one, _, _) = stuck()
+    base = refine(own, unknowns(), unknowns().start)
+    assert base is not None
+    fit = refine(own, one.fit.unknowns, one.fit.vector)
+    assert fit is not None
+    held, alone = (own.residuals(f.unknowns, f.vector[None, :], "validate")[0] for f in (base, fit))
+    assert held is not None
+    assert alone is not None
+    weights = ChannelWeights(own)
+    weights.base_held = held
+    fit, again = weights.weigh(fit)
+    assert again is not None
+    return own, weights, (replace(one, fit=fit), fit, again), offered
+
+
+def test_what_else_is_missing_is_found_in_step_and_runs_freely_with_it():
+    own, weights, found, offered = with_drag()
+    made = way(own, Following(own), offered).continued(weights, found)
+    assert made is not None
+    (beside,) = made.beside
+    assert beside.candidate.name == "windage:motor"
+    assert [r.accepted for r in made.rounds] == [beside]
+    _choice, fit, _held = made.found
+    values = fit.unknowns.named(fit.vector)
+    assert values["motorEffect.windage.b_q"] == pytest.approx(1.5e-3, rel=0.2)
+    assert values[f"{BLOCK}.dF"] == pytest.approx(0.6, rel=0.1)
+    assert (made.left, made.note) == ((), IS_ALL), "then nothing but noise is left in step"
+
+
+def test_what_was_found_in_step_counts_only_if_the_free_run_is_better_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    own, weights, found, offered = with_drag()
+    monkeypatch.setattr(SelfExcited, "_freed", lambda *_given: None)
+    made = way(own, Following(own), offered).continued(weights, found)
+    assert made is not None
+    assert (made.found[1], made.beside, made.rounds) == (found[1], (), ())
+    assert (made.left, made.note) == (None, "")
+
+
+@pytest.mark.parametrize(("leaves", "asked"), [(0.0, ([], NO_MORE)), (np.inf, (None, ""))])
+def test_of_a_free_run_out_of_step_nothing_further_is_asked_that_does_not_show_in_step(
+    monkeypatch: pytest.MonkeyPatch, leaves: float, asked: tuple[list[Candidate] | None, str]
+):
+    own, weights, found, _offered = with_drag()
+    monkeypatch.setattr(room, "ROUGH", leaves)
+    made = continued(own, weights, found, Following(own))
+    assert made is not None
+    assert made.beside == ()
+    assert (made.left, made.note) == asked
+
+
+def test_it_is_for_what_falls_leaves_much_and_can_follow():
+    own, _weights, (one, _, _) = stuck(off=3.0)
+    assert way(own, Following(own)).is_for(one)
+    assert not way(own, Following(own, gain=None)).is_for(one)
+    own, _weights, (one, _, _) = stuck(off=1.0)
+    assert not way(own, Following(own)).is_for(one)
+    own, _weights, (one, _, _) = stuck("windage", off=30.0)
+    assert not way(own, Following(own)).is_for(one)
+
+
+def test_what_was_found_beside_an_effect_is_accepted_with_it_and_its_rounds_count():
+    own, _weights, _found, offered = with_drag()
+
+    def led(given: ChannelWeights, judged: Judged) -> Continued | None:
+        return way(own, Following(own), offered).continued(given, judged)
+
+    stribeck = [c for c in offered if c.effect.name == "stribeck"]
+    drags = [c for c in offered if c.effect.name == "windage"]
+    made = attribute(own, unknowns(), stribeck, lambda _: {}, seed=1, continued=led)
+    assert made is not None
+    assert drags
+    assert [s.candidate.name for s in made.accepted] == ["stribeck:motor", "windage:motor"]
+    assert [r.accepted.candidate.name for r in made.rounds if r.accepted] == [
+        "stribeck:motor",
+        "windage:motor",
+    ]
+
+
 @pytest.mark.parametrize("is_all", [True, False])
 def test_nothing_further_is_looked_for_where_nothing_else_is_missing_in_step(is_all: bool):
     offered = tuple(c for c in candidates("stribeck", "windage") if c.slot.name == "motor")
-    drag = {f"motorEffect.windage.{name}": x for name, x in (("b_q", 1.5e-3), ("n", 2.0), ("v_r", 30.0))}
-    own = bench(offered, {**CURVE, **drag}, 3, held_shapes(offered))
+    own = bench(offered, {**CURVE, **DRAG}, 3, held_shapes(offered))
     found = attribute(
         own,
         unknowns(),
         offered,
         lambda _: {},
         seed=1,
-        continued=lambda _weights, one: Continued(one, (), is_all),
+        continued=lambda _weights, one: Continued(one, (), () if is_all else None, IS_ALL if is_all else ""),
     )
     assert found is not None
     assert len(found.accepted) == (1 if is_all else 2)
-    assert (IS_ALL in found.notes) is is_all
+    assert (IS_ALL in found.notes) == is_all
 
 
 def test_in_step_nothing_else_is_missing_if_only_noise_is_left_in_every_signal():

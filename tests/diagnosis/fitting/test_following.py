@@ -9,6 +9,7 @@ import pytest
 from diagnosis.analytic import MOTOR, bench, candidates, unknowns
 from thsa_cosim.diagnosis.fitting import following as room
 from thsa_cosim.diagnosis.fitting.following import (
+    HARDLY,
     MEANS,
     Followed,
     Following,
@@ -209,7 +210,7 @@ def test_a_followed_signal_behind_a_lag_does_not_count_and_the_gain_is_the_one_t
         unit = place.followed(unknowns(), unknowns().start)
         assert unit is not None
         assert place.gain(unknowns(), unknowns().start) == pytest.approx(0.1 * unit.unit_gain)
-        assert place.beside_signal(1.0).weights == {"u": 0.0}
+        assert place.beside_signal(1.0).weights == {"u": HARDLY}
         assert place.at(1.0).weights == {}
         assert following.of(replace(MOTOR, name="elsewhere")).followed(unknowns(), unknowns().start) is None
     assert runner.closed

@@ -37,6 +37,11 @@ NOT_CONTINUED = (
 )
 #: What is noted where such an effect is all that is missing.
 IS_ALL = "nothing further was looked for: kept in step, the model leaves nothing but noise in any signal"
+#: What is noted where the free run says little, and in step nothing was found.
+NO_MORE = (
+    "nothing further was found with the model kept in step; its free run, which is out of step, was asked only for what"
+    " does not show there"
+)
 #: Objections to what another form, or another effect, takes the place of.
 TAKEN = "another form of it fits better"
 APART = "explains the held-out recordings as well, but not the fit recording that distinguishes them"
@@ -68,6 +73,12 @@ class Round:
         """The same without the Jacobians of what was only weighed; errors are compared with those of the rivals."""
         whole = {id(s) for s in (self.accepted, *self.rivals, *self.forms)}
         return replace(self, scored=tuple(s if id(s) in whole else s.folded for s in self.scored))
+
+    @property
+    def without_responses(self) -> "Round":
+        """The same without the responses of what was not refined: those of the first round tell what is alike."""
+        refined = {id(s.proposal) for s in (*self.scored, *self.rivals)}
+        return replace(self, proposals=tuple(p if id(p) in refined else p.summary for p in self.proposals))
 
     def with_accepted(self, choice: Scored) -> "Round":
         """The same with ``choice`` in place of the accepted one."""
@@ -142,12 +153,16 @@ Judged = tuple[Scored, Fit, FloatArray]
 class Continued:
     """An accepted effect as it was, or better, and what was found on the ``ways`` to that.
 
-    ``is_all``: nothing else is missing, whatever the free run leaves.
+    ``left``: the only candidates that may still be missing, whatever the free run leaves; None: all may. ``note``: why.
+    ``rounds``: those in which what is ``beside`` it was found.
     """
 
     found: Judged
     ways: tuple[Scored, ...]
-    is_all: bool = False
+    left: Sequence[Candidate] | None = None
+    note: str = ""
+    rounds: tuple[Round, ...] = ()
+    beside: tuple[Scored, ...] = ()
 
 
 #: The weights, and what was accepted → what it leads to; None: there is no other way.
@@ -168,6 +183,7 @@ def attribute(
     begin: Begin = lambda _weights, _base, _held: None,
     stuck: Begin = lambda _weights, _base, _held: None,
     continued: Continue = lambda _weights, _found: None,
+    rough: Callable[[Scored], bool] = lambda _: False,
     settled: float = 0.0,
     least: float = 0.0,
     say: Say = lambda _: None,
@@ -178,9 +194,10 @@ def attribute(
     ``machine``: whose orders the ripples keep to. ``deep``: further starts, larger sizes, other forms and rivals count.
     ``begin``: what is found in another way first, and gone on from. ``stuck``: what is found in another way where
     nothing that the first screening leads to leaves nothing; effects that it finds are all that count. ``continued``: a
-    better fit of an accepted effect, or the same, and other ways to it, which count as forms of it. ``settled``:
-    structure, in standard deviations of the noise, which is not looked into any more beside an effect, nor for it
-    whether a known order is free. ``least``: share of what is left that an effect has to promise.
+    better fit of an accepted effect, or the same, and other ways to it, which count as forms of it. ``rough``: whether
+    ``continued`` is for a candidate, so that a first fit of it will do. ``settled``: structure, in standard deviations
+    of the noise, which is not looked into any more beside an effect, nor for it whether a known order is free.
+    ``least``: share of what is left that an effect has to promise.
     """
     say("fitting the declared model")
     base = refine(
@@ -203,7 +220,7 @@ def attribute(
     rounds: list[Round] = []
     accepted: list[Scored] = []
     said: list[str] = []
-    is_all = False
+    pool = candidates
     begun = begin(weights, base, held)
     if begun is not None:
         rounds, accepted, current, current_held = [*begun.rounds], [*begun.accepted], begun.fit, begun.held
@@ -212,13 +229,14 @@ def attribute(
             break
         if accepted and settled and not leaves_structure(bench, weights, current_held, settled):
             break
+        if not pool:
+            break
         beside = f" beside {accepted[-1].candidate.name}" if accepted else ""
-        say(f"screening {len(candidates)} candidates{beside}")
-        offered: Sequence[Candidate] = candidates
+        say(f"screening {len(pool)} candidates{beside}")
+        offered = pool
         while offered:
-            selection = Selection(bench, weights, current, current_held, say)
-            free = [c for c in offered if not any(_is_taken(c, s.candidate) for s in accepted)]
-            left = first_free_orders([c for c in free if not _is_known(c, current)], current)
+            selection = Selection(bench, weights, current, current_held, say, rough)
+            left = _left(offered, accepted, current)
             own = seed + len(rounds)
             screened = _screened(selection, left, scan(current), own, machine, least)
             if not rounds and selection.is_open(screened.scored):
@@ -228,32 +246,35 @@ def attribute(
                     current, current_held = otherwise.fit, otherwise.held
                     break
                 screened = screened.beside(() if otherwise is None else otherwise.tried)
-            rounds.append(
-                _round(selection, left, screened, own, accepted, offered is candidates, deep).folded
-            )
-            if len(rounds) > 1:  # which effects are alike is told by the responses of the first
-                rounds[-1] = replace(rounds[-1], proposals=tuple(p.summary for p in rounds[-1].proposals))
+            rounds.append(_round(selection, left, screened, own, accepted, offered is pool, deep).folded)
+            if len(rounds) > 1:
+                rounds[-1] = rounds[-1].without_responses
             choice = rounds[-1].accepted
             if choice is None:
                 break
-            fit, reweighed = weights.weigh(choice.fit)
+            fit, reweighed = weights.weigh(choice.fit, 0) if rough(choice) else weights.weigh(choice.fit)
             if reweighed is None:
                 return None
             current_held = reweighed
+            more: tuple[Round, ...] = ()
+            others: tuple[Scored, ...] = ()
             if not settled:
                 choice, fit, current_held = freed(bench, weights, choice, (fit, reweighed), say)
                 way = continued(weights, (choice, fit, current_held))
                 if way is not None:
-                    led, is_all = way.found[1] is not fit, way.is_all
+                    led = way.found[1] is not fit
                     choice, fit, current_held = way.found
                     rounds[-1] = replace(rounds[-1], forms=way.ways)
                     said.append(choice.candidate.name + (CONTINUED if led else NOT_CONTINUED))
-                    said += [IS_ALL] if is_all else []
+                    said += [way.note] if way.note else []
+                    more, others = way.rounds, way.beside
+                    pool = candidates if way.left is None else way.left
             rounds[-1] = rounds[-1].with_accepted(choice)
-            accepted.append(choice)
+            rounds += more
+            accepted += [choice, *others]
             current = fit
-            offered = () if is_all else further_parts(choice.candidate, candidates)
-        if is_all or offered is candidates:
+            offered = further_parts(choice.candidate, pool)
+        if offered is pool:
             break
     notes: list[str] = []
     if not settled:  # else what is left may be what bends the model
@@ -277,6 +298,38 @@ def attribute(
         bench.factors("fit"),
         (*(begun.notes if begun is not None else ()), *said, *notes),
     )
+
+
+def shallow_round(
+    selection: Selection,
+    candidates: Sequence[Candidate],
+    waves: Mapping[str, Sequence[float]],
+    accepted: Sequence[Scored],
+    seed: int,
+    machine: Machine,
+    least: float,
+) -> Round:
+    """A round of `attribute` beside what is ``accepted``, without further starts, larger sizes and other forms.
+
+    ``waves``: wave numbers by slot. ``least``: share of what is left that an effect has to promise.
+    """
+    left = _left(candidates, accepted, selection.current)
+    screened = _screened(selection, left, waves, seed, machine, least)
+    found = _round(selection, left, screened, seed, accepted, True, deep=False)
+    if found.accepted is not None:
+        choice, scored, objections = found.accepted, list(found.scored), found.objections
+        better = selection.overtaking(choice, scored)
+        if better is not None:
+            choice, (scored, objections) = better, _taken_over(better, scored, objections)
+        rivals = selection.rivals(choice, scored, {s.candidate.effect.name for s in accepted})
+        found = replace(found, accepted=choice, scored=tuple(scored), objections=objections, rivals=rivals)
+    return found.folded
+
+
+def _left(offered: Sequence[Candidate], accepted: Sequence[Scored], fit: Fit) -> list[Candidate]:
+    """What is left of the ``offered`` beside what is ``accepted``, and in the model of ``fit``."""
+    free = [c for c in offered if not any(_is_taken(c, s.candidate) for s in accepted)]
+    return first_free_orders([c for c in free if not _is_known(c, fit)], fit)
 
 
 def _with_places(

@@ -26,7 +26,12 @@ def best_form(
     proposals: Sequence[Proposal],
     offered: Sequence[Candidate],
 ) -> tuple[Scored, tuple[Scored, ...]]:
-    """The form of ``choice`` that fits best, and those that fit as well within chance; with all parameters fitted."""
+    """The form of ``choice`` that fits best, and those that fit as well within chance; with all parameters fitted.
+
+    One that is gone on from in another way keeps its form: the others are compared on that way.
+    """
+    if selection.rough(choice):
+        return choice, ()
     choice = along_exponents(selection, choice, choice)
     fitted = [
         s

@@ -15,6 +15,8 @@ from thsa_cosim.signals import FloatArray
 
 #: Mean squared residual, in variances of the noise, above which a fit may have missed the optimum.
 ENOUGH = 1.05
+#: Iterations of a fit that is gone on from in another way.
+ROUGH = 2
 #: What leaves less than this many times the squares of the noise leaves little beside it.
 LITTLE = 2.0
 #: Shares of the promised amplitudes that are tried where these gain less than FORESEEN of what they promised.
@@ -137,14 +139,16 @@ def judge(bench: Bench, proposal: Proposal, fit: Fit, current: Fit, held: FloatA
     )
 
 
-def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray) -> Scored:
+def polish(bench: Bench, choice: Scored, current: Fit, held: FloatArray, rough: bool = False) -> Scored:
     """The same with every Jacobian column fresh, and once more with the declared parameters from the drawing.
 
     A missing effect bends the declared parameters; from there an effect that acts by contact may not find its optimum.
+    ``rough``: it is gone on from in another way, a first fit will do.
     """
-    unknowns = choice.fit.unknowns
-    fits = [refine(bench, unknowns, choice.fit.vector, steps=choice.fit.steps)]
-    if fits[0] is None or _is_bent(bench, fits[0]) or fits[0].misfit > ENOUGH * fits[0].residual.size:
+    unknowns, iterations = choice.fit.unknowns, ROUGH if rough else 8
+    fits = [refine(bench, unknowns, choice.fit.vector, steps=choice.fit.steps, iterations=iterations)]
+    is_open = fits[0] is None or _is_bent(bench, fits[0]) or fits[0].misfit > ENOUGH * fits[0].residual.size
+    if is_open and not rough:
         known = np.inf if fits[0] is None else fits[0].cost
         near, steps = (choice.fit if fits[0] is None else fits[0]).jacobian, choice.fit.steps
         drawn = unknowns.at_drawing(choice.fit.vector)

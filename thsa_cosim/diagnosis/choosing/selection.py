@@ -180,13 +180,19 @@ def other_laws(proposals: Sequence[Proposal], scored: Sequence[Scored]) -> list[
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """A round against the model so far: its fit ``current`` and its held-out residuals ``held`` (N,)."""
+    """A round against the model so far: its fit ``current`` and its held-out residuals ``held`` (N,).
+
+    ``rough``: whether a candidate is gone on from in another way, so that a first fit of it will do. ``whole``: whether
+    what is compared is fitted with all parameters.
+    """
 
     bench: Bench
     weights: ChannelWeights
     current: Fit
     held: FloatArray
     say: Say = lambda _: None
+    rough: Callable[[Scored], bool] = lambda _: False
+    whole: bool = True
     _polished: dict[int, Scored] = field(default_factory=dict)
 
     def refined(self, proposals: Sequence[Proposal], limit: float) -> list[Scored]:
@@ -374,11 +380,15 @@ class Selection:
         """A candidate fitted with all parameters, once."""
         key = id(one.proposal)
         if key not in self._polished:
-            self._polished[key] = polish(self.bench, one, self.current, self.held)
+            polished = (
+                polish(self.bench, one, self.current, self.held, self.rough(one)) if self.whole else None
+            )
+            self._polished[key] = polished or self._go_on(one)
         return self._polished[key]
 
     def _whole(self, one: Scored) -> Scored:
-        self.say(f"fitting {one.candidate.name} with all parameters")
+        if self.whole:
+            self.say(f"fitting {one.candidate.name} with all parameters")
         return self.polished(one)
 
     def _go_on(self, one: Scored) -> Scored:

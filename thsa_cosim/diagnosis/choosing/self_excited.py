@@ -17,12 +17,22 @@ from itertools import islice
 import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
-from thsa_cosim.diagnosis.choosing.attribution import Continued, Judged
+from thsa_cosim.diagnosis.choosing.attribution import (
+    IS_ALL,
+    NO_MORE,
+    Continued,
+    Judged,
+    Round,
+    Scan,
+    shallow_round,
+)
 from thsa_cosim.diagnosis.choosing.curves import falls, nearest
 from thsa_cosim.diagnosis.choosing.forms import is_form
 from thsa_cosim.diagnosis.choosing.gates import insignificant, out_of_range
+from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import ENOUGH, Scored
-from thsa_cosim.diagnosis.choosing.selection import Say
+from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.choosing.selection import Say, Selection
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.ensemble import descent
 from thsa_cosim.diagnosis.fitting.fit import Fit, cost_of, refine
@@ -53,17 +63,29 @@ LOST = (10.0, 2.5)
 #: In step nothing else is missing if no signal leaves more than this many standard deviations of its noise. Set while
 #: looking at the same: 1.00 to 1.015 with nothing else, from 1.06 on with a wrong effect.
 ALONE = 1.05
+#: A free run that leaves more than so many mean squares of the noise is gone on from in step, whatever it would become.
+ROUGH = 2.0
+#: Else what is missing beside it is looked for in step, where that promises this share of what is left.
+LEAST = 0.1
+#: What does less than this share of all that it does to the other signals is taken for a following machine's own.
+SHOWN = 1e-3
 #: Fits of the spectra and of the free run with all unknowns, which follow.
 FINAL = 12
 
 
 @dataclass(frozen=True, eq=False)
 class SelfExcited:
-    """How to fit such a friction on ``bench``, in the form among ``candidates`` that fits best."""
+    """How to fit such a friction on ``bench``, in the form among ``candidates`` that fits best, and what is beside it.
+
+    ``unknowns``: of the declared model.
+    """
 
     bench: Bench
     following: Following
+    unknowns: Unknowns
     candidates: Sequence[Candidate]
+    scan: Scan
+    machine: Machine
     seed: int
     say: Say
 
@@ -74,7 +96,7 @@ class SelfExcited:
         fitted in step.
         """
         choice, fit, held = found
-        values = {**choice.fit.unknowns.named(choice.fit.vector), **fit.unknowns.named(fit.vector)}
+        values = _values(choice, fit)
         left = weights.plain(fit.residual, "fit")
         if float(np.mean(left**2)) < ENOUGH or not falls(choice.candidate, values):
             return None
@@ -84,14 +106,77 @@ class SelfExcited:
         if gain is None or followed is None:
             return None
         self.say(f"fitting {choice.candidate.name} in step with {followed.channel}")
-        stepped = self._in_step(following.beside_signal(gain), choice, fit)
+        bench = following.beside_signal(gain)
+        stepped = self._in_step(bench, choice, fit)
         if stepped is None:
             return None
         is_all = _leaves_noise(following.at(gain), stepped.fit)
+        rounds: tuple[Round, ...] = ()
+        hidden: Sequence[Candidate] = self.candidates
+        if (
+            not is_all
+            and (more := self._beside(bench, following.at(gain), stepped, followed.channel)) is not None
+        ):
+            stepped, rounds, hidden = more
+        beside = tuple(r.accepted for r in rounds if r.accepted is not None)
+        if beside:
+            is_all = _leaves_noise(following.at(gain), stepped.fit)
         self.say(f"letting the model with {stepped.candidate.name} run freely")
         better = self._better(weights, fit, stepped, following.finer(TOLERANCE))
         same = replace(choice, proposal=replace(choice.proposal), fit=fit, validate=held), fit, held
-        return Continued(better or same, (stepped,), is_all)
+        if better is None and beside:  # the free run knows nothing of what was found in step
+            return Continued(same, (stepped,))
+        led = better or same
+        if is_all:
+            return Continued(led, (stepped,), (), IS_ALL, rounds, beside)
+        if not beside and _leaves_much(self.bench, led[1]):
+            return Continued(led, (stepped,), hidden, NO_MORE)
+        return Continued(led, (stepped,), rounds=rounds, beside=beside)
+
+    def is_for(self, one: Scored) -> bool:
+        """Whether a candidate that leaves much is to be continued, however well it is fitted."""
+        if not _leaves_much(self.bench, one.fit) or not falls(one.candidate, _values(one, one.fit)):
+            return False
+        return self.following.of(one.candidate.slot).gain(one.fit.unknowns, one.fit.vector) is not None
+
+    def _beside(
+        self, beside_signal: Bench, bench: Bench, stepped: Scored, channel: str
+    ) -> tuple[Scored, tuple[Round, ...], list[Candidate]] | None:
+        """``stepped`` fitted in step with one more effect, if there is one, the round of that, and what hides in step.
+
+        In step no event is at another time than the machine's: what else is missing shows as it does elsewhere, unless
+        it shows nowhere but in the signal of the followed ``channel``. ``bench``, ``beside_signal``: where that signal
+        counts, and where it does not. None if nothing can be said.
+        """
+        bench.weights = {}
+        weights, declared = ChannelWeights(bench), stepped.fit.at(self.unknowns.names)
+        (base,) = bench.residuals(self.unknowns, declared[None, :], "validate")
+        if base is None:
+            return None
+        weights.base_held = base
+        fit, held = weights.weigh(_weighed(stepped.fit, 1.0 / beside_signal.factors("fit")))
+        if held is None:
+            return None
+        others = [c for c in self.candidates if c.effect.name != stepped.candidate.effect.name]
+        self.say(f"screening {len(others)} candidates in step beside {stepped.candidate.name}")
+        selection = Selection(bench, weights, fit, held, self.say, whole=False)
+        found = shallow_round(selection, others, self.scan(fit), [stepped], self.seed, self.machine, LEAST)
+        hidden = _hidden(found.proposals, bench, channel)
+        if found.accepted is None:
+            return stepped, (), hidden
+        other = found.accepted.fit
+        jacobian = other.jacobian_of(other.unknowns, beside_signal.factors("fit") / bench.factors("fit"))
+        again = refine(
+            beside_signal,
+            other.unknowns,
+            other.vector,
+            jacobian=jacobian,
+            steps=other.steps,
+            near=True,
+            iterations=ITERATIONS,
+            enough=10.0,
+        )
+        return None if again is None else (replace(stepped, fit=again), (found.without_responses,), hidden)
 
     def _better(self, weights: ChannelWeights, fit: Fit, stepped: Scored, fine: Bench) -> Judged | None:
         """What the free run of ``stepped`` leads to on the bench ``fine``, if that is better than ``fit``."""
@@ -162,7 +247,7 @@ class SelfExcited:
     def _starts(self, choice: Scored, fit: Fit) -> Iterator[tuple[Scored, Unknowns, FloatArray, FloatArray]]:
         """``choice`` and its other forms, with the unknowns of the whole model, where they start, and steps (n,)."""
         yield choice, fit.unknowns, fit.vector, fit.steps
-        values = {**choice.fit.unknowns.named(choice.fit.vector), **fit.unknowns.named(fit.vector)}
+        values = _values(choice, fit)
         own = {p.variable for p in choice.candidate.parameters}
         shared = {p.name for p in choice.candidate.parameters}
         for other in (c for c in self.candidates if is_form(c, choice.candidate)):
@@ -179,6 +264,29 @@ class SelfExcited:
                 yield replace(choice, proposal=proposal), unknowns, vector, steps
 
 
+def _leaves_much(bench: Bench, fit: Fit) -> bool:
+    """Whether the free run of ``fit`` is out of step with the machine, or much else is missing."""
+    return float(np.mean((fit.residual / bench.factors("fit")) ** 2)) > ROUGH
+
+
+def _hidden(proposals: Sequence[Proposal], bench: Bench, channel: str) -> list[Candidate]:
+    """The candidates of ``proposals`` that do nothing to any signal but that of the ``channel``."""
+    channels = [c for t in bench.of("fit") for c in t.case.channels]
+    others = np.concatenate([np.full(c.measured.size, c.name != channel) for c in channels])
+    shown = {
+        p.candidate.key
+        for p in proposals
+        if np.linalg.norm(p.response[others]) > SHOWN * np.linalg.norm(p.response)
+    }
+    hidden = {p.candidate.key: p.candidate for p in proposals if p.candidate.key not in shown}
+    return list(hidden.values())
+
+
+def _values(choice: Scored, fit: Fit) -> dict[str, float]:
+    """What a model with ``choice`` was fitted to, by variable."""
+    return {**choice.fit.unknowns.named(choice.fit.vector), **fit.unknowns.named(fit.vector)}
+
+
 def _spreads(unknowns: Unknowns, vector: FloatArray, stepped: Fit) -> FloatArray:
     """(n,) how far an ensemble about ``vector`` (n,) reaches, 0 for what stays; ``stepped``: the fit in step."""
     errors = dict(zip(stepped.unknowns.names, stepped.stderr(), strict=True))
@@ -190,6 +298,15 @@ def _spreads(unknowns: Unknowns, vector: FloatArray, stepped: Fit) -> FloatArray
         return HALF * spread if MOVES[0] < errors[unknown.name] / spread < MOVES[1] else 0.0
 
     return np.array([of(u, float(x)) for u, x in zip(unknowns.members, vector, strict=True)])
+
+
+def _weighed(fit: Fit, factors: FloatArray) -> Fit:
+    """``fit`` with its residuals times ``factors`` (N,)."""
+    residual = fit.residual * factors
+    rows = fit.jacobian_of(fit.unknowns, factors)
+    return replace(
+        fit, residual=residual, own=rows, shared=None, cost=cost_of(fit.unknowns, fit.vector, residual)
+    )
 
 
 def _leaves_noise(following: Bench, stepped: Fit) -> bool:

@@ -47,6 +47,8 @@ SLOW = 0.1
 LAGGED_STEPS = tuple(float(g) for g in 10.0 ** np.arange(-2.0, 0.5, 0.5))
 #: Where the undoing of a lag begins to fade, as a share of half the sampling rate: it amplifies fast noise most.
 FADES = 0.85
+#: Factor of the residuals of a signal that does not count: what the model leaves in it stays known.
+HARDLY = 1e-3
 
 
 @dataclass(frozen=True)
@@ -122,10 +124,10 @@ class Following:
         return self._bench.beside(*self._opened, {self._followed.slot.gain: gain})
 
     def beside_signal(self, gain: float) -> Bench:
-        """The same, the followed signal not counted: a model is not bent to follow its noise."""
+        """The same, the followed signal hardly counted: a model is not bent to follow its noise."""
         made = self.at(gain)
         assert self._followed is not None
-        made.weights = {**made.weights, self._followed.channel: 0.0}
+        made.weights = {**made.weights, self._followed.channel: HARDLY}
         return made
 
     def finer(self, tolerance: float) -> Bench:

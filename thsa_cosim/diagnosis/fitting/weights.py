@@ -26,8 +26,8 @@ class ChannelWeights:
         self.base_held: FloatArray = np.zeros(0)
         self._bench = bench
 
-    def weigh(self, fit: Fit) -> tuple[Fit, FloatArray | None]:
-        """Weigh by what ``fit`` leaves: the fit under these weights and its held-out residuals.
+    def weigh(self, fit: Fit, iterations: int = 8) -> tuple[Fit, FloatArray | None]:
+        """Weigh by what ``fit`` leaves: the fit under these weights, of so many iterations, and its held-out residuals.
 
         The weights stay as they are where the fit under new ones cannot be simulated on the held-out recordings.
         """
@@ -38,7 +38,15 @@ class ChannelWeights:
             factors = bench.factors("fit")
             self.take(after)
             jacobian = fit.jacobian_of(fit.unknowns, bench.factors("fit") / factors)
-            again = refine(bench, fit.unknowns, fit.vector, jacobian=jacobian, steps=fit.steps, near=True)
+            again = refine(
+                bench,
+                fit.unknowns,
+                fit.vector,
+                jacobian=jacobian,
+                steps=fit.steps,
+                near=True,
+                iterations=iterations,
+            )
             moved = fit if again is None else again
             held = self._held(moved)
             if held is not None:

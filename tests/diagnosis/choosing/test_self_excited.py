@@ -252,15 +252,18 @@ def test_what_else_is_missing_is_found_in_step_and_runs_freely_with_it():
     assert (made.left, made.note) == ((), IS_ALL), "then nothing but noise is left in step"
 
 
-def test_what_was_found_in_step_counts_only_if_the_free_run_is_better_with_it(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(("leaves", "asked"), [(0.0, (["windage"], NO_MORE)), (np.inf, (None, ""))])
+def test_what_was_found_in_step_counts_only_if_the_free_run_is_better_with_it_or_asks_for_it(
+    monkeypatch: pytest.MonkeyPatch, leaves: float, asked: tuple[list[str] | None, str]
 ):
     own, weights, found, offered = with_drag()
+    monkeypatch.setattr(room, "ROUGH", leaves)
     monkeypatch.setattr(SelfExcited, "_freed", lambda *_given: None)
     made = way(own, Following(own), offered).continued(weights, found)
     assert made is not None
     assert (made.found[1], made.beside, made.rounds) == (found[1], (), ())
-    assert (made.left, made.note) == (None, "")
+    left = None if made.left is None else [c.effect.name for c in made.left]
+    assert (left, made.note) == asked
 
 
 @pytest.mark.parametrize(("leaves", "asked"), [(0.0, ([], NO_MORE)), (np.inf, (None, ""))])

@@ -154,12 +154,22 @@ def test_a_law_has_a_term_for_each_coefficient_with_its_shapes_put_in():
     assert law.held_out_gain == pytest.approx(80.0)
 
 
-def test_the_wave_of_the_voltage_is_offered_beside_the_soft_sign_whose_width_it_shares():
-    variants = [e.variants[0] for e in EMPIRICAL if e.variants[0].block == "EmpiricalVoltage"]
+@pytest.mark.parametrize(
+    ("block", "first", "beside", "shared"),
+    [
+        # A wave of the inverter has the width of the soft sign, a second harmonic the wave number of the first.
+        ("EmpiricalVoltage", "k_s", "k_sin", {"i_s"}),
+        ("Empirical", "k_sin", "k_sin2", {"w"}),
+    ],
+)
+def test_some_terms_are_offered_beside_another_one_whose_shape_they_share(
+    block: str, first: str, beside: str, shared: set[str]
+):
+    variants = [e.variants[0] for e in EMPIRICAL if e.variants[0].block == block]
     (wave,) = [v for v in variants if v.beside]
-    (sign,) = [v for v in variants if v.parameters[0].name == "k_s"]
-    assert {p.name for p in wave.parameters} & {p.name for p in sign.parameters} == {"i_s"}
-    assert not any(e.variants[0].beside for e in EMPIRICAL if e.variants[0] is not wave)
+    assert wave.parameters[0].name == beside
+    (other,) = [v for v in variants if v.parameters[0].name == first]
+    assert {p.name for p in wave.parameters} & {p.name for p in other.parameters} == shared
 
 
 def beside_a_law(true: dict[str, float], *, added: bool = True) -> tuple[FoundLaw, Attribution]:

@@ -37,10 +37,10 @@ NOT_CONTINUED = (
 )
 #: What is noted where such an effect is all that is missing.
 IS_ALL = "nothing further was looked for: kept in step, the model leaves nothing but noise in any signal"
-#: What is noted where the free run says little, and in step nothing was found.
+#: What is noted where the free run says little of what else there is.
 NO_MORE = (
-    "nothing further was found with the model kept in step; its free run, which is out of step, was asked only for what"
-    " does not show there"
+    "what else is missing was looked for with the model kept in step; its free run, which is out of step, was asked"
+    " only for what was found or does not show there"
 )
 #: Objections to what another form, or another effect, takes the place of.
 TAKEN = "another form of it fits better"

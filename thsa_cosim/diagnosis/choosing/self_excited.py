@@ -112,7 +112,7 @@ class SelfExcited:
             return None
         is_all = _leaves_noise(following.at(gain), stepped.fit)
         rounds: tuple[Round, ...] = ()
-        hidden: Sequence[Candidate] = self.candidates
+        hidden: list[Candidate] | None = None
         if (
             not is_all
             and (more := self._beside(bench, following.at(gain), stepped, followed.channel)) is not None
@@ -124,13 +124,14 @@ class SelfExcited:
         self.say(f"letting the model with {stepped.candidate.name} run freely")
         better = self._better(weights, fit, stepped, following.finer(TOLERANCE))
         same = replace(choice, proposal=replace(choice.proposal), fit=fit, validate=held), fit, held
-        if better is None and beside:  # the free run knows nothing of what was found in step
-            return Continued(same, (stepped,))
-        led = better or same
+        led, unproven = better or same, beside if better is None else ()
+        if unproven:  # the free run knows nothing of what was found in step
+            rounds, beside, is_all = (), (), False
         if is_all:
             return Continued(led, (stepped,), (), IS_ALL, rounds, beside)
-        if not beside and _leaves_much(self.bench, led[1]):
-            return Continued(led, (stepped,), hidden, NO_MORE)
+        if hidden is not None and _leaves_much(self.bench, led[1]):
+            asked = [*(s.candidate for s in unproven), *hidden]
+            return Continued(led, (stepped,), asked, NO_MORE, rounds, beside)
         return Continued(led, (stepped,), rounds=rounds, beside=beside)
 
     def is_for(self, one: Scored) -> bool:

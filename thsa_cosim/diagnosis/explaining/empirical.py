@@ -100,6 +100,7 @@ _LIBRARY: Mapping[tuple[str, str], tuple[tuple[EffectParameter, ...], ...]] = {
         (_k("k_h", "F", "sgn(v)/(1 + (v/{v_f})^2)"), _FALL),
         (_k("k_d", "F", "exp(-d/{d_f}) sgn(v)"), _DISTANCE),
         (_k("k_sin", "F", "sin({w} z)", 0.01), _k("k_cos", "F", "cos({w} z)", 0.01), _WAVE),
+        (_k("k_sin2", "F", "sin(2 {w} z)", 0.005), _k("k_cos2", "F", "cos(2 {w} z)", 0.005), _WAVE),
     ),
     ("FrictionEffect", "EmpiricalRise"): (
         (_k("k_b", "F", "exp(-((z - {z_b})/{w_b})^2/2) sgn(v)"), _PLACE, _WIDTH),
@@ -167,7 +168,7 @@ _ONLY: Mapping[str, tuple[str, ...]] = {
     "EmpiricalDelay": ("velocitySensor",),
 }
 #: Terms that are only offered once another one of their block is in the model, whose shape they share.
-_BESIDE = {("EmpiricalVoltage", "k_sin")}
+_BESIDE = {("EmpiricalVoltage", "k_sin"), ("Empirical", "k_sin2")}
 
 
 def _effect(interface: str, block: str, parameters: tuple[EffectParameter, ...]) -> Effect:

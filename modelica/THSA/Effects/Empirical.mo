@@ -23,8 +23,8 @@ block Empirical "Terms in speed, position, distance and load, for what no effect
   parameter Real d_f(min=1e-12) = 1 "Distance over which that falls";
   parameter Real k_sin = 0 "Coefficient of sin(w z)";
   parameter Real k_cos = 0 "Coefficient of cos(w z)";
-  parameter Real k_sin2 = 0 "Coefficient of sin(2 w z), beside the wave itself";
-  parameter Real k_cos2 = 0 "Coefficient of cos(2 w z), beside the wave itself";
+  parameter Real k_sin2 = 0 "Coefficient of sin(2 w z)";
+  parameter Real k_cos2 = 0 "Coefficient of cos(2 w z)";
   parameter Real w = 1 "Wave number";
   Real d(start=0, fixed=true, nominal=1e-2) "Distance travelled; at rest where no term has it";
 equation
@@ -36,8 +36,8 @@ equation
     + (if k_g > 0 or k_g < 0 then k_g*exp(-(v/v_f)^2)*s else 0)
     + (if k_h > 0 or k_h < 0 then k_h/(1 + (v/v_f)^2)*s else 0)
     + (if k_d > 0 or k_d < 0 then k_d*exp(-d/d_f)*s else 0)
-    + (if k_sin > 0 or k_sin < 0 or k_cos > 0 or k_cos < 0 then k_sin*sin(w*z) + k_cos*cos(w*z)
-      + k_sin2*sin(2*w*z) + k_cos2*cos(2*w*z) else 0);
+    + (if k_sin > 0 or k_sin < 0 or k_cos > 0 or k_cos < 0 then k_sin*sin(w*z) + k_cos*cos(w*z) else 0)
+    + (if k_sin2 > 0 or k_sin2 < 0 or k_cos2 > 0 or k_cos2 < 0 then k_sin2*sin(2*w*z) + k_cos2*cos(2*w*z) else 0);
   annotation(Documentation(info="<html><p>No physics is meant by it: terms are chosen by what the recordings show, one coefficient
 each.</p></html>"));
 end Empirical;

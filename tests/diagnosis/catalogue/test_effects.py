@@ -454,6 +454,8 @@ TERMS: dict[str, Law] = {
     "exp(-d/{d_f}) sgn(v)": lambda q: np.exp(-distance(q) / SHAPES["d_f"]) * q["s"],
     "sin({w} z)": lambda q: np.sin(WAVE * q["z"]),
     "cos({w} z)": lambda q: np.cos(WAVE * q["z"]),
+    "sin(2 {w} z)": lambda q: np.sin(2.0 * WAVE * q["z"]),
+    "cos(2 {w} z)": lambda q: np.cos(2.0 * WAVE * q["z"]),
     "sin({n} phi)": lambda q: np.sin(2.0 * q["phi"]),
     "cos({n} phi)": lambda q: np.cos(2.0 * q["phi"]),
     "T sin({n} phi)": lambda q: q["T"] * np.sin(2.0 * q["phi"]),

@@ -235,7 +235,8 @@ def attribute(
         say(f"screening {len(pool)} candidates{beside}")
         offered = pool
         while offered:
-            selection = Selection(bench, weights, current, current_held, say, rough)
+            # The optimum of a free run that is out of step is where it began.
+            selection = Selection(bench, weights, current, current_held, say, rough, pool is candidates)
             left = _left(offered, accepted, current)
             own = seed + len(rounds)
             screened = _screened(selection, left, scan(current), own, machine, least)
@@ -252,7 +253,8 @@ def attribute(
             choice = rounds[-1].accepted
             if choice is None:
                 break
-            fit, reweighed = weights.weigh(choice.fit, 0) if rough(choice) else weights.weigh(choice.fit)
+            is_rough = rough(choice) or not selection.whole
+            fit, reweighed = weights.weigh(choice.fit, 0) if is_rough else weights.weigh(choice.fit)
             if reweighed is None:
                 return None
             current_held = reweighed

@@ -252,30 +252,23 @@ def test_what_else_is_missing_is_found_in_step_and_runs_freely_with_it():
     assert (made.left, made.note) == ((), IS_ALL), "then nothing but noise is left in step"
 
 
-@pytest.mark.parametrize(("leaves", "asked"), [(0.0, (["windage"], NO_MORE)), (np.inf, (None, ""))])
-def test_what_was_found_in_step_counts_only_if_the_free_run_is_better_with_it_or_asks_for_it(
-    monkeypatch: pytest.MonkeyPatch, leaves: float, asked: tuple[list[str] | None, str]
+def test_what_was_found_in_step_counts_only_if_the_free_run_is_better_with_it_which_is_asked_for_it(
+    monkeypatch: pytest.MonkeyPatch,
 ):
     own, weights, found, offered = with_drag()
-    monkeypatch.setattr(room, "ROUGH", leaves)
     monkeypatch.setattr(SelfExcited, "_freed", lambda *_given: None)
     made = way(own, Following(own), offered).continued(weights, found)
     assert made is not None
     assert (made.found[1], made.beside, made.rounds) == (found[1], (), ())
-    left = None if made.left is None else [c.effect.name for c in made.left]
-    assert (left, made.note) == asked
+    assert made.left is not None
+    assert ([c.effect.name for c in made.left], made.note) == (["windage"], NO_MORE)
 
 
-@pytest.mark.parametrize(("leaves", "asked"), [(0.0, ([], NO_MORE)), (np.inf, (None, ""))])
-def test_of_a_free_run_out_of_step_nothing_further_is_asked_that_does_not_show_in_step(
-    monkeypatch: pytest.MonkeyPatch, leaves: float, asked: tuple[list[Candidate] | None, str]
-):
+def test_nothing_further_is_asked_of_a_free_run_that_does_not_show_in_step():
     own, weights, found, _offered = with_drag()
-    monkeypatch.setattr(room, "ROUGH", leaves)
     made = continued(own, weights, found, Following(own))
     assert made is not None
-    assert made.beside == ()
-    assert (made.left, made.note) == asked
+    assert (made.beside, made.left, made.note) == ((), [], NO_MORE)
 
 
 def test_it_is_for_what_falls_leaves_much_and_can_follow():

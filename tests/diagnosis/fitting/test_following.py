@@ -11,6 +11,7 @@ from thsa_cosim.diagnosis.fitting import following as room
 from thsa_cosim.diagnosis.fitting.following import (
     HARDLY,
     MEANS,
+    TOLERANCE,
     Followed,
     Following,
     driven,
@@ -218,7 +219,10 @@ def test_a_followed_signal_behind_a_lag_does_not_count_and_the_gain_is_the_one_t
 
 def test_means_are_undone_with_the_lag():
     followed = Followed(MOTOR, "u", 1.0, lag=0.02)
-    given = driven(TRIALS[0], followed).case.inputs["motorMeasured"]
+    behind = driven(TRIALS[0], followed).case
+    given = behind.inputs["motorMeasured"]
+    assert behind.tolerance == TOLERANCE, "it bends at every sample"
+    assert driven(TRIALS[0], Followed(MOTOR, "u", 1.0)).case.tolerance == TRIALS[0].case.tolerance
     channel = next(c for c in CASE.channels if c.name == "u")
     aim = without_lag(channel.time, channel.measured, 0.02, channel.mean_of, CASE.inputs.time)
     np.testing.assert_array_equal(given, aim)

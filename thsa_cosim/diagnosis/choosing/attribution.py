@@ -39,8 +39,8 @@ NOT_CONTINUED = (
 IS_ALL = "nothing further was looked for: kept in step, the model leaves nothing but noise in any signal"
 #: What is noted where the free run says little of what else there is.
 NO_MORE = (
-    "what else is missing was looked for with the model kept in step; its free run, which is out of step, was asked"
-    " only for what was found or does not show there"
+    "what else is missing was looked for with the model kept in step; its free run was asked only for what was found"
+    " or does not show there"
 )
 #: Objections to what another form, or another effect, takes the place of.
 TAKEN = "another form of it fits better"
@@ -424,6 +424,8 @@ def _round(
         proposals = sorted([*proposals, *further], key=lambda p: -p.gain)
         gains = largest_gains(selection.current, proposals, seed)
         limit = threshold(gains)
+    if deep and not whole and selection.is_open(scored):
+        scored = selection.with_harmonics(scored, proposals)
     choice, objections = selection.choose(scored, limit, not accepted, not whole)
     rivals: tuple[Scored, ...] = ()
     forms: tuple[Scored, ...] = ()

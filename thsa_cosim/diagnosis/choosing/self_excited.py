@@ -129,7 +129,7 @@ class SelfExcited:
             rounds, beside, is_all = (), (), False
         if is_all:
             return Continued(led, (stepped,), (), IS_ALL, rounds, beside)
-        if hidden is not None and _leaves_much(self.bench, led[1]):
+        if hidden is not None:
             asked = [*(s.candidate for s in unproven), *hidden]
             return Continued(led, (stepped,), asked, NO_MORE, rounds, beside)
         return Continued(led, (stepped,), rounds=rounds, beside=beside)
@@ -155,7 +155,7 @@ class SelfExcited:
         if base is None:
             return None
         weights.base_held = base
-        fit, held = weights.weigh(_weighed(stepped.fit, 1.0 / beside_signal.factors("fit")))
+        fit, held = weights.weigh(_weighed(stepped.fit, 1.0 / beside_signal.factors("fit")), fresh=[])
         if held is None:
             return None
         others = [c for c in self.candidates if c.effect.name != stepped.candidate.effect.name]
@@ -201,8 +201,26 @@ class SelfExcited:
         return replace(best, fit=again, validate=own), again, own
 
     def _in_step(self, bench: Bench, choice: Scored, fit: Fit) -> Scored | None:
-        """``choice`` fitted on the ``bench`` that follows; None if that cannot be simulated."""
-        again = refine(bench, fit.unknowns, fit.vector, steps=fit.steps, iterations=ITERATIONS, enough=10.0)
+        """``choice`` fitted on the ``bench`` that follows; None if that cannot be simulated.
+
+        What the declared parameters do changes little in step: their part of the Jacobian is that of the start.
+        """
+        first = refine(bench, fit.unknowns, fit.vector, steps=fit.steps, iterations=1)
+        if first is None:
+            return None
+        variables = [p.variable for p in choice.candidate.parameters if p.variable in fit.unknowns.names]
+        again = refine(
+            bench,
+            fit.unknowns,
+            first.vector,
+            residual=first.residual,
+            jacobian=first.jacobian,
+            steps=first.steps,
+            fresh=[int(k) for k in fit.unknowns.index(variables)],
+            anew=True,
+            iterations=ITERATIONS,
+            enough=10.0,
+        )
         return None if again is None else replace(choice, proposal=replace(choice.proposal), fit=again)
 
     def _freed(self, fine: Bench, stepped: Scored) -> Scored | None:

@@ -26,9 +26,12 @@ class ChannelWeights:
         self.base_held: FloatArray = np.zeros(0)
         self._bench = bench
 
-    def weigh(self, fit: Fit, iterations: int = 8) -> tuple[Fit, FloatArray | None]:
+    def weigh(
+        self, fit: Fit, iterations: int = 8, fresh: list[int] | None = None
+    ) -> tuple[Fit, FloatArray | None]:
         """Weigh by what ``fit`` leaves: the fit under these weights, of so many iterations, and its held-out residuals.
 
+        ``fresh``: which columns of the Jacobian are taken anew on the way (default: all).
         The weights stay as they are where the fit under new ones cannot be simulated on the held-out recordings.
         """
         bench, before, after = self._bench, self._bench.weights, {}
@@ -46,6 +49,7 @@ class ChannelWeights:
                 steps=fit.steps,
                 near=True,
                 iterations=iterations,
+                fresh=fresh,
             )
             moved = fit if again is None else again
             held = self._held(moved)

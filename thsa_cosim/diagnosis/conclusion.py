@@ -14,7 +14,7 @@ from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.extend import write_extended_model
-from thsa_cosim.diagnosis.choosing.attribution import Attribution
+from thsa_cosim.diagnosis.choosing.attribution import CONTINUED, NOT_CONTINUED, Attribution
 from thsa_cosim.diagnosis.choosing.curves import falls
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
 from thsa_cosim.diagnosis.choosing.findings import (
@@ -266,10 +266,12 @@ class Conclusion:
     def _identify_near(
         self, final: Fit, fmu: Path, unknowns: Unknowns, accepted: Sequence[Scored]
     ) -> Identified:
-        """``unknowns`` from the drawing and from where the search ended."""
+        """``unknowns`` from the drawing, where that can be in step with the machine, and where the search ended."""
         hint = final.at(unknowns.names)
         near = by_samples(final, self.trials, self.bench.trials)
-        return self._identify(fmu, unknowns, [unknowns.at_drawing(hint), hint], accepted, near)
+        sticks = any(n == IN_STEP or n.endswith((CONTINUED, NOT_CONTINUED)) for n in self.found.notes)
+        starts = [hint] if sticks else [unknowns.at_drawing(hint), hint]
+        return self._identify(fmu, unknowns, starts, accepted, near)
 
     def _identify(
         self,

@@ -10,6 +10,7 @@ import pytest
 
 from tests.diagnosis.fitting.test_fit import TIME, Formula, bench, trial, unknown
 from thsa_cosim.diagnosis.choosing.findings import values_of
+from thsa_cosim.diagnosis.fitting import identified
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.diagnosis.fitting.identified import identify_model
@@ -73,6 +74,30 @@ def test_an_identification_ends_without_noise():
         lambda simulation, experiments: nullcontext(Formula(friction)),  # type: ignore[arg-type, return-value]
     )
     assert not values_of(found.fit, declared=True)["motor"].identifiable
+
+
+@pytest.mark.parametrize(("starts", "iterations"), [(1, [4]), (2, [12, 4])])
+def test_from_where_a_search_ended_a_few_iterations_are_enough(
+    monkeypatch: pytest.MonkeyPatch, starts: int, iterations: list[int]
+):
+    _own, near = fitted(0.03, 0.0)
+    asked: list[int] = []
+
+    def counted(*given: object, iterations: int, **more: object) -> Fit | None:
+        asked.append(iterations)
+        return None if len(asked) < starts else refine(*given, iterations=iterations, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(identified, "refine", counted)
+    identify_model(
+        Path("x.fmu"),
+        (trial("fit"), trial("validate")),
+        UNKNOWNS,
+        [UNKNOWNS.start, near.vector][-starts:],
+        SimulationTable(),
+        lambda simulation, experiments: nullcontext(Formula(friction)),  # type: ignore[arg-type, return-value]
+        near,
+    )
+    assert asked == iterations
 
 
 def test_what_tells_them_apart_beside_the_noise_stays():

@@ -47,7 +47,7 @@ SLOW = 0.1
 LAGGED_STEPS = tuple(float(g) for g in 10.0 ** np.arange(-2.0, 0.5, 0.5))
 #: Where the undoing of a lag begins to fade, as a share of half the sampling rate: it amplifies fast noise most.
 FADES = 0.85
-#: Relative tolerance behind a lag: the measured speed bends at every sample, so the steps are short, and nothing is lost
+#: Relative tolerance behind a lag: the measured speed bends at every sample, so steps are short, and nothing is lost
 #: against 1e-4 (of one simulated unit every signal's rms was the same to four digits) but a third of the time.
 TOLERANCE = 1e-3
 #: Factor of the residuals of a signal that does not count: what the model leaves in it stays known.

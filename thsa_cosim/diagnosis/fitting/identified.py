@@ -78,8 +78,8 @@ def identify_model(
 ) -> Identified:
     """Identify ``unknowns`` of an FMU on the fit recordings from every one of ``starts``; the best fit counts.
 
-    ``near``: a fit of the same unknowns in an equal model, without weights, whose Jacobian leads the way; every start
-    but the first one is where a search has ended.
+    ``near``: a fit of the same unknowns in an equal model, without weights, whose Jacobian leads the way; the last
+    start is where a search has ended.
     StudyError if the FMU cannot be simulated at any start.
     """
     own = with_fmu(trials, fmu)
@@ -109,7 +109,7 @@ def identify_model(
                 jacobian=jacobian,
                 steps=steps,
                 near=jacobian is not None,
-                iterations=SEARCHED if near is not None and number else ITERATIONS,
+                iterations=SEARCHED if near is not None and number == len(begun) - 1 else ITERATIONS,
                 to_beat=rest,
             )
             fits += [] if fit is None else [fit]

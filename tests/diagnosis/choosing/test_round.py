@@ -63,10 +63,6 @@ class Stages:
         self.asked["sizes"] = (scored, list(proposals))
         return list(scored)
 
-    def with_harmonics(self, scored: Any, proposals: Any) -> list[Any]:
-        self.asked["harmonics"] = (list(scored), list(proposals))
-        return [*scored, self.two]
-
     def further(self, proposals: Any) -> list[Any]:
         return [self.later]
 
@@ -180,17 +176,12 @@ def test_what_takes_over_comes_first_and_the_others_are_told_why(monkeypatch: py
     assert (found.accepted, found.scored[:2]) == (own, (own, s.one))
 
 
-def test_parts_of_an_effect_have_no_rivals_and_no_further_starts_but_harmonics(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_parts_of_an_effect_have_no_rivals_and_no_further_starts(monkeypatch: pytest.MonkeyPatch):
     s = Stages(monkeypatch, is_open=True, choice="one")
     found = s.round(whole=False)
-    assert set(s.asked) == {"screen", "refined", "harmonics", "choose"}
-    assert s.asked["choose"] == ([s.one, s.two], 20.0, True, True)
-    assert (found.accepted, found.rivals, found.forms, found.scored) == (s.one, (), (), (s.one, s.two))
-    s = Stages(monkeypatch, is_open=False, choice="one")
-    s.round(whole=False)
-    assert "harmonics" not in s.asked, "nothing is left for them"
+    assert set(s.asked) == {"screen", "refined", "choose"}
+    assert s.asked["choose"] == ([s.one], 20.0, True, True)
+    assert (found.accepted, found.rivals, found.forms, found.scored) == (s.one, (), (), (s.one,))
 
 
 def test_those_that_were_not_refused_are_told_what_took_their_place():

@@ -90,27 +90,6 @@ def test_ripples_at_other_wave_numbers_are_those_that_promise_a_tenth_of_the_bes
     assert len(other_waves([ripple(100.0 - k) for k in range(20)], [])) == room.WAVES
 
 
-def test_the_harmonic_of_a_ripple_in_the_model_is_fitted_whatever_it_promises(
-    monkeypatch: pytest.MonkeyPatch, selection: Selection
-):
-    selection.current.unknowns = SimpleNamespace(names=("motor.n",))
-
-    def part(key: str, variable: str, scanned: bool = True) -> Any:
-        own = proposal("cogging", 0.1)
-        own.candidate.key = key
-        own.candidate.shapes = (SimpleNamespace(scanned=scanned, variable=variable),)
-        return own
-
-    harmonic, further, curve = part("h", "motor.n"), part("o", "motor.n_3"), part("c", "motor.n", False)
-    refined: Any = SimpleNamespace(candidate=SimpleNamespace(key="r"), held_out_gain=5.0)
-    fitted: Any = SimpleNamespace(held_out_gain=9.0)
-    asked: list[Any] = []
-    monkeypatch.setattr(Selection, "fitted", lambda _self, proposals: asked.append(proposals) or [fitted])
-    proposals = [harmonic, further, curve, part("r", "motor.n")]
-    assert selection.with_harmonics([refined], proposals) == [fitted, refined]
-    assert asked == [[harmonic]], "no further order, no curve, and nothing twice"
-
-
 def test_a_law_that_was_left_out_of_an_effect_that_was_refined_has_its_best_start():
     def law(effect: str, key: str, gain: float) -> Any:
         own = proposal(effect, gain)

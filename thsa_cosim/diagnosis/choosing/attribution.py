@@ -424,8 +424,6 @@ def _round(
         proposals = sorted([*proposals, *further], key=lambda p: -p.gain)
         gains = largest_gains(selection.current, proposals, seed)
         limit = threshold(gains)
-    if deep and not whole and selection.is_open(scored):
-        scored = selection.with_harmonics(scored, proposals)
     choice, objections = selection.choose(scored, limit, not accepted, not whole)
     rivals: tuple[Scored, ...] = ()
     forms: tuple[Scored, ...] = ()

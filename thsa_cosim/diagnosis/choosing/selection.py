@@ -243,21 +243,6 @@ class Selection:
         found = sorted([*scored, *self.fitted(chosen)], key=lambda s: -s.held_out_gain)
         return simplest_first(found, self._ties)
 
-    def with_harmonics(self, scored: Sequence[Scored], proposals: Sequence[Proposal]) -> list[Scored]:
-        """``scored`` and the harmonic of a ripple that is in the model, fitted whatever it promises; best first.
-
-        Where a ripple makes a machine stick and slip, what a small harmonic does hardly shows what a larger one would.
-        """
-        known, refined = self.current.unknowns.names, {s.candidate.key for s in scored}
-        harmonics = [
-            p
-            for p in proposals
-            if p.candidate.key not in refined
-            and any(q.scanned for q in p.candidate.shapes)
-            and all(q.variable in known for q in p.candidate.shapes if q.scanned)
-        ]
-        return sorted([*scored, *self.fitted(harmonics)], key=lambda s: -s.held_out_gain)
-
     def at_sizes(self, scored: Sequence[Scored], proposals: Sequence[Proposal]) -> list[Scored]:
         """``scored`` and, where they lead astray, effects of larger sizes than their responses promise; best first."""
         if not is_led_astray(self.current, scored):

@@ -75,7 +75,7 @@ FINAL = 12
 
 @dataclass(frozen=True, eq=False)
 class SelfExcited:
-    """How to fit such a friction on ``bench``, in the form among ``candidates`` that fits best, and what is beside it.
+    """How to fit such a friction on ``bench``, in its best form among ``candidates``, and what else is missing.
 
     ``unknowns``: of the declared model.
     """

@@ -271,6 +271,81 @@ def test_nothing_further_is_asked_of_a_free_run_that_does_not_show_in_step():
     assert (made.beside, made.left, made.note) == ((), [], NO_MORE)
 
 
+def test_what_explains_the_held_out_recordings_as_well_in_step_is_a_tie():
+    own, weights, found, _offered = with_drag()
+    drags = [c for c in candidates("windage") if c.slot.name == "motor" and not c.variant.instead]
+    (drag,) = drags
+    twin = replace(drag, effect=replace(drag.effect, name="twin"))
+    made = way(own, Following(own), (drag, twin)).continued(weights, found)
+    assert made is not None
+    (one,) = made.rounds
+    assert one.accepted is not None
+    named = {one.accepted.candidate.effect.name, *(r.candidate.effect.name for r in one.rivals)}
+    assert named == {"windage", "twin"}
+
+
+def test_the_same_friction_is_no_second_one():
+    own, weights, found, _offered = with_drag()
+    elsewhere = [c for c in candidates("stribeck") if c.slot.name == "gear"]
+    made = way(own, Following(own), elsewhere).continued(weights, found)
+    assert made is not None
+    assert (made.rounds, made.beside, made.left) == ((), (), [])
+
+
+def test_what_hardly_counted_counts_again_beside_what_else_is_missing():
+    _own, _weights, found = stuck()
+    fit = found[1]
+    factors = np.linspace(0.5, 2.0, fit.residual.size)
+    made = room._weighed(room._weighed(fit, 1e-3 * factors), 1e3 / factors)
+    np.testing.assert_allclose(made.residual, fit.residual)
+    np.testing.assert_allclose(made.jacobian, fit.jacobian)
+    assert made.cost == pytest.approx(fit.cost)
+    light = room._weighed(fit, np.full(fit.residual.size, 1e-3))
+    prior = fit.unknowns.prior(fit.vector)
+    assert light.cost == pytest.approx(1e-6 * (fit.residual @ fit.residual) + prior @ prior)
+    np.testing.assert_allclose(light.jacobian, 1e-3 * fit.jacobian)
+
+
+def test_what_does_nothing_to_any_other_signal_hides_in_step():
+    own, _weights, _found, offered = with_drag()
+    (one, *_), size = offered, sum(c.measured.size for c in own.of("fit")[0].case.channels)
+    other = next(c for c in candidates("stribeck") if c.slot.name == "gear")
+    first = own.of("fit")[0].case.channels[0]
+    names = np.concatenate([np.full(c.measured.size, c.name) for c in own.of("fit")[0].case.channels])
+    hides = np.where(names == first.name, 1.0, 0.0)[:, None]
+    shows = np.where(names == first.name, 1.0, 0.1)[:, None]
+    assert hides.shape == (size, 1)
+    proposals: Any = [SimpleNamespace(candidate=c, response=r) for c, r in ((one, hides), (other, shows))]
+    assert room._hidden(proposals, own, first.name) == [one]
+    proposals.append(SimpleNamespace(candidate=one, response=shows))
+    assert room._hidden(proposals, own, first.name) == [], "another start of it shows"
+
+
+def test_a_candidate_that_is_continued_and_one_that_hides_are_fitted_roughly(monkeypatch: pytest.MonkeyPatch):
+    own, _weights, _found, offered = with_drag()
+    asked: list[tuple[int, ...]] = []
+    weigh = ChannelWeights.weigh
+
+    def counted(self: ChannelWeights, fit: Fit, *iterations: int) -> Any:
+        asked.append(iterations)
+        return weigh(self, fit, *iterations)
+
+    monkeypatch.setattr(ChannelWeights, "weigh", counted)
+    drags = [c for c in offered if c.effect.name == "windage"]
+    attribute(
+        own,
+        unknowns(),
+        [c for c in offered if c.effect.name == "stribeck"],
+        lambda _: {},
+        seed=1,
+        rough=lambda one: one.candidate.effect.name == "stribeck",
+        continued=lambda _weights, one: (
+            Continued(one, (), drags, NO_MORE) if one[0].candidate.effect.name == "stribeck" else None
+        ),
+    )
+    assert asked == [(), (0,), (0,)], "the declared model, the friction, and the drag"
+
+
 def test_it_is_for_what_falls_leaves_much_and_can_follow():
     own, _weights, (one, _, _) = stuck(off=3.0)
     assert way(own, Following(own)).is_for(one)

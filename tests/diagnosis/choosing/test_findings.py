@@ -214,13 +214,15 @@ def test_an_effect_is_as_probable_as_chance_and_its_rivals_leave_it(found: Any):
 
 def test_ways_of_one_effect_are_one_with_its_places_spelt_out():
     members = [scored(proposal("a", 90.0)), scored(proposal("a", 80.0, "gear")), scored(proposal("b", 70.0))]
-    rivals = [(), (), (scored(proposal("c", 69.0)),)]
+    rivals = [(scored(proposal("b", 69.0)),), (), (scored(proposal("c", 69.0)),)]
     rounds = [one_round([m.proposal], [m], m, ("",), r) for m, r in zip(members, rivals, strict=True)]
     unknowns = Unknowns(tuple(unknown(m.candidate.parameters[0].variable) for m in members))
     fit = Fit(unknowns, np.array([1.0, 2.0, 3.0]), np.ones(50), np.eye(50, 3) * 9, np.ones(3), 0.0, True)
     effects = found_effects(attribution(*rounds, accepted=tuple(members)), fit)
     assert [e.name for e in effects] == ["a:motor", "b:motor"]
-    assert [e.equivalent for e in effects] == [(), ("c:motor",)], "each has the rivals of its own round"
+    assert [e.equivalent for e in effects] == [(), ("c:motor",)], (
+        "each has the rivals of its own round, but for what is in the model as well"
+    )
     assert {n: v.value for n, v in effects[0].parameters.items()} == {"motor.a.k": 1.0, "gear.a.k": 2.0}
     assert {n: v.value for n, v in effects[1].parameters.items()} == {"k": 3.0}
 

@@ -97,8 +97,10 @@ def found_effects(
         owner = round_of(found, members[0])
         order = order_of(members[0], values, machine)
         name = _named(members[0], order)
-        rivals = tuple(dict.fromkeys(_rival_name(r, machine) for r in owner.rivals))
-        rivals = tuple(r for r in rivals if r != name)
+        # What is in the model with it is nothing that could be there in its place.
+        others = merged.keys() - {members[0].candidate.effect.name}
+        apart = [r for r in owner.rivals if r.candidate.effect.name not in others]
+        rivals = tuple(r for r in dict.fromkeys(_rival_name(r, machine) for r in apart) if r != name)
         chance = owner.probability(members[0].fit_gain)
         effects.append(
             FoundEffect(

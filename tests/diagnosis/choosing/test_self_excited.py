@@ -11,7 +11,15 @@ import pytest
 from diagnosis.analytic import bench, candidates, unknowns
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.choosing import self_excited as room
-from thsa_cosim.diagnosis.choosing.attribution import IS_ALL, NO_MORE, Continued, Judged, attribute
+from thsa_cosim.diagnosis.choosing.attribution import (
+    IS_ALL,
+    NO_MORE,
+    Continued,
+    Judged,
+    Round,
+    _of_one_effect,
+    attribute,
+)
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE
 from thsa_cosim.diagnosis.choosing.score import held_shapes, polish, score
 from thsa_cosim.diagnosis.choosing.screen import propose
@@ -344,6 +352,15 @@ def test_a_candidate_that_is_continued_and_one_that_hides_are_fitted_roughly(mon
         ),
     )
     assert asked == [(), (0,), (0,)], "the declared model, the friction, and the drag"
+
+
+def test_beside_what_was_found_with_it_only_other_places_are_rivals_of_an_effect():
+    def one(effect: str) -> Any:
+        return SimpleNamespace(candidate=SimpleNamespace(effect=SimpleNamespace(name=effect)))
+
+    place, other = one("stribeck"), one("windage")
+    own: Any = Round(0.0, (), (), None, (), (other, place), np.zeros(0), np.zeros(0))
+    assert _of_one_effect(own, one("stribeck")).rivals == (place,)
 
 
 def test_it_is_for_what_falls_leaves_much_and_can_follow():

@@ -270,6 +270,8 @@ def attribute(
                     said.append(choice.candidate.name + (CONTINUED if led else NOT_CONTINUED))
                     said += [way.note] if way.note else []
                     more, others = way.rounds, way.beside
+                    if others:
+                        rounds[-1] = _of_one_effect(rounds[-1], choice)
                     pool = candidates if way.left is None else way.left
             rounds[-1] = rounds[-1].with_accepted(choice)
             rounds += more
@@ -326,6 +328,12 @@ def shallow_round(
         rivals = selection.rivals(choice, scored, {s.candidate.effect.name for s in accepted})
         found = replace(found, accepted=choice, scored=tuple(scored), objections=objections, rivals=rivals)
     return found.folded
+
+
+def _of_one_effect(found: Round, choice: Scored) -> Round:
+    """``found`` without the rivals of ``choice`` but at other places: they were compared while another was missing."""
+    own = choice.candidate.effect.name
+    return replace(found, rivals=tuple(r for r in found.rivals if r.candidate.effect.name == own))
 
 
 def _left(offered: Sequence[Candidate], accepted: Sequence[Scored], fit: Fit) -> list[Candidate]:

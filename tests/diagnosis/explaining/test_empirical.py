@@ -170,6 +170,8 @@ def test_some_terms_are_offered_beside_another_one_whose_shape_they_share(
     assert wave.parameters[0].name == beside
     (other,) = [v for v in variants if v.parameters[0].name == first]
     assert {p.name for p in wave.parameters} & {p.name for p in other.parameters} == shared
+    named = {(v.block, v.parameters[0].name) for e in EMPIRICAL for v in e.variants[:1] if v.beside}
+    assert named == {("EmpiricalVoltage", "k_sin"), ("Empirical", "k_sin2")}, "no other term waits for one"
 
 
 def beside_a_law(true: dict[str, float], *, added: bool = True) -> tuple[FoundLaw, Attribution]:

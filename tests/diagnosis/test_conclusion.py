@@ -8,8 +8,6 @@ import pytest
 
 from diagnosis.analytic import candidates
 from thsa_cosim.diagnosis import conclusion as room
-from thsa_cosim.diagnosis.choosing.attribution import CONTINUED, NOT_CONTINUED
-from thsa_cosim.diagnosis.choosing.in_step import NOTE as IN_STEP
 from thsa_cosim.diagnosis.conclusion import WORTH, Conclusion, note_on_no_law
 
 
@@ -36,24 +34,21 @@ def test_what_falls_over_the_speed_is_what_makes_it_stick(effect: str, values: d
     at = {p.variable: values[p.name] for p in one.parameters if p.name in values}
     final = SimpleNamespace(unknowns=SimpleNamespace(named=lambda _vector: at), vector=np.zeros(0))
     asked: Any = SimpleNamespace(
-        found=SimpleNamespace(accepted=(SimpleNamespace(candidate=one),), final=final, notes=("other",))
+        found=SimpleNamespace(accepted=(SimpleNamespace(candidate=one),), final=final, sticking=())
     )
     assert Conclusion._sticking(asked) == (one.name if effect == "stribeck" else "")
-    asked.found.notes = ("other", IN_STEP)
-    assert Conclusion._sticking(asked) == one.name, "or what was found in step"
+    asked.found.sticking = ("a:b",)
+    assert Conclusion._sticking(asked) == "a:b", "or what was found in step, be it dropped since"
 
 
-@pytest.mark.parametrize(
-    ("note", "from_drawing"),
-    [("other", True), (IN_STEP, False), (f"a:b{CONTINUED}", False), (f"a:b{NOT_CONTINUED}", False)],
-)
+@pytest.mark.parametrize("sticking", [(), ("a:b",)])
 def test_an_extended_model_that_sticks_and_slips_is_not_identified_from_the_drawing(
-    monkeypatch: pytest.MonkeyPatch, note: str, from_drawing: bool
+    monkeypatch: pytest.MonkeyPatch, sticking: tuple[str, ...]
 ):
     monkeypatch.setattr(room, "by_samples", lambda *_given: None)
     asked: list[Any] = []
     own: Any = SimpleNamespace(
-        trials=(), bench=SimpleNamespace(trials=()), found=SimpleNamespace(notes=("x", note)),
+        trials=(), bench=SimpleNamespace(trials=()), found=SimpleNamespace(sticking=sticking),
         _identify=lambda _fmu, _unknowns, starts, *_rest: asked.extend(starts),
     )  # fmt: skip
     hint, drawing = np.array([2.0]), np.array([1.0])
@@ -62,4 +57,4 @@ def test_an_extended_model_that_sticks_and_slips_is_not_identified_from_the_draw
     )
     final: Any = SimpleNamespace(at=lambda _names: hint)
     Conclusion._identify_near(own, final, None, unknowns, ())  # type: ignore[arg-type]
-    assert asked == ([drawing, hint] if from_drawing else [hint])
+    assert asked == ([hint] if sticking else [drawing, hint])

@@ -14,7 +14,7 @@ from thsa_cosim.diagnosis.blackbox.saved import write_wrapper
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.extend import write_extended_model
-from thsa_cosim.diagnosis.choosing.attribution import CONTINUED, NOT_CONTINUED, Attribution
+from thsa_cosim.diagnosis.choosing.attribution import Attribution
 from thsa_cosim.diagnosis.choosing.curves import falls
 from thsa_cosim.diagnosis.choosing.equivalence import equivalence
 from thsa_cosim.diagnosis.choosing.findings import (
@@ -25,7 +25,6 @@ from thsa_cosim.diagnosis.choosing.findings import (
     values_of,
 )
 from thsa_cosim.diagnosis.choosing.hidden import hidden_parts, notes_on_hidden, widening
-from thsa_cosim.diagnosis.choosing.in_step import NOTE as IN_STEP
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.choosing.spread import between_models
@@ -182,12 +181,11 @@ class Conclusion:
     def _sticking(self) -> str:
         """The name of an effect that makes the machine stick and slip, "" if there is none.
 
-        It was found in step, or its law falls over the speed.
+        It was found in step, be it dropped since, or its law falls over the speed.
         """
-        if IN_STEP in self.found.notes:
-            return next((s.candidate.name for s in self.found.accepted), "")
         values = self.found.final.unknowns.named(self.found.final.vector)
-        return next((s.candidate.name for s in self.found.accepted if falls(s.candidate, values)), "")
+        falling = (s.candidate.name for s in self.found.accepted if falls(s.candidate, values))
+        return next(iter((*self.found.sticking, *falling)), "")
 
     def _coupled(self, model: Identified) -> CouplingError | str:
         """What the communication step of a foreign FMU costs at the fit, on the first fit recording."""
@@ -269,8 +267,7 @@ class Conclusion:
         """``unknowns`` from the drawing, where that can be in step with the machine, and where the search ended."""
         hint = final.at(unknowns.names)
         near = by_samples(final, self.trials, self.bench.trials)
-        sticks = any(n == IN_STEP or n.endswith((CONTINUED, NOT_CONTINUED)) for n in self.found.notes)
-        starts = [hint] if sticks else [unknowns.at_drawing(hint), hint]
+        starts = [hint] if self.found.sticking else [unknowns.at_drawing(hint), hint]
         return self._identify(fmu, unknowns, starts, accepted, near)
 
     def _identify(
@@ -307,13 +304,13 @@ class Conclusion:
 def note_on_no_law(share: float, sticking: str, *, empirical: bool) -> str:
     """Why no law is searched in the ``share`` of the declared model's structure that effects leave; "" if one is.
 
-    ``sticking``: an effect in the model that makes it stick and slip, "" for none.
+    ``sticking``: an effect that makes the machine stick and slip, "" for none.
     """
     if empirical or (share >= WORTH and not sticking):
         return ""
     what = f"in the {share:.0%} of the repeatable residual that the effects leave"
     if sticking:
-        what = f"beside {sticking}: a model that sticks and slips at other times than the machine says little of it"
+        what = f"beside {sticking}: a model that sticks and slips at other times than the machine says little of that"
     return f"no empirical law was searched {what}; empirical = true in [diagnose] searches one"
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from thsa_cosim.diagnosis.catalogue.known import known_effects
-from thsa_cosim.diagnosis.choosing.attribution import Round
+from thsa_cosim.diagnosis.choosing.rounds import Round
 from thsa_cosim.diagnosis.choosing.chance import probability
 from thsa_cosim.diagnosis.choosing.findings import (
     NO_MORE,

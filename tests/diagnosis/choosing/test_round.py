@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from thsa_cosim.diagnosis.choosing import attribution as room
+from thsa_cosim.diagnosis.choosing.rounds import APART, TAKEN, Round, taken_over
 
 
 class Stages:
@@ -102,7 +103,7 @@ class Stages:
         self.asked["rivals"] = (choice, list(scored), named)
         return (self.two,)
 
-    def round(self, whole: bool = True, accepted: Sequence[Any] = ()) -> room.Round:
+    def round(self, whole: bool = True, accepted: Sequence[Any] = ()) -> Round:
         screened = room._screened(self, OFFERED, WAVES, 7)  # type: ignore[arg-type]
         return room._round(self, OFFERED, screened, 7, accepted, whole)  # type: ignore[arg-type]
 
@@ -190,6 +191,6 @@ def test_those_that_were_not_refused_are_told_what_took_their_place():
         return SimpleNamespace(candidate=candidate, proposal=object())
 
     choice, form, other, refused, untried = one("a"), one("a"), one("b"), one("c"), one("d")
-    scored, whys = room._taken_over(choice, [form, choice, other, refused, untried], ["", "x", "", "no"])
+    scored, whys = taken_over(choice, [form, choice, other, refused, untried], ["", "x", "", "no"])
     assert scored == [choice, form, other, refused, untried]
-    assert whys == ("", room.TAKEN, room.APART, "no")
+    assert whys == ("", TAKEN, APART, "no")

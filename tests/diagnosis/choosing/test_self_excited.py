@@ -138,12 +138,14 @@ def test_a_better_fit_comes_from_step_by_spectra_and_is_gone_on_with_at_a_finer_
     assert own.evaluations > before + fine.evaluations - 1, "what ran before counts, and nothing twice"
 
 
-@pytest.mark.parametrize(("first", "second", "led"), [(0.0, 9.0, False), (9.0, 0.0, False), (9.0, 9.0, True)])
+@pytest.mark.parametrize(
+    ("lost", "led"), [((0.0, 9, 9), False), ((99, 0.0, 9), False), ((99, 9, 0.0), False), ((99, 9, 9), True)]
+)
 def test_the_way_is_given_up_where_spectra_stay_far_from_noise(
-    monkeypatch: pytest.MonkeyPatch, first: float, second: float, led: bool
+    monkeypatch: pytest.MonkeyPatch, lost: tuple[float, float, float], led: bool
 ):
     own, weights, found = stuck()
-    monkeypatch.setattr(room, "LOST", (first, second))
+    monkeypatch.setattr(room, "LOST", lost)
     made = continued(own, weights, found, Following(own))
     assert (made.found[1] is not found[1]) == led
 

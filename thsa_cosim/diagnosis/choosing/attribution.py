@@ -5,17 +5,18 @@ effect must still be needed beside the others.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import zip_longest
+from dataclasses import dataclass, replace
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
-from thsa_cosim.diagnosis.choosing.chance import largest_gains, probability, threshold
+from thsa_cosim.diagnosis.choosing.again import Model, asked_again
+from thsa_cosim.diagnosis.choosing.chance import largest_gains, threshold
 from thsa_cosim.diagnosis.choosing.forms import best_form, from_other_starts, rivals_forms
 from thsa_cosim.diagnosis.choosing.gates import SMALLEST_STRUCTURE
 from thsa_cosim.diagnosis.choosing.needless import further_parts, prune, within_range
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine
 from thsa_cosim.diagnosis.choosing.places import tied_places
 from thsa_cosim.diagnosis.choosing.ripples import first_free_orders, freed, on_orders
+from thsa_cosim.diagnosis.choosing.rounds import Round, taken_over
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
 from thsa_cosim.diagnosis.choosing.selection import Say, Selection
@@ -42,56 +43,7 @@ NO_MORE = (
     "what else is missing was looked for with the model kept in step; its free run was asked only for what was found"
     " or does not show there"
 )
-#: Objections to what another form, or another effect, takes the place of.
-TAKEN = "another form of it fits better"
-APART = "explains the held-out recordings as well, but not the fit recording that distinguishes them"
-
 Scan = Callable[[Fit], Mapping[str, Sequence[float]]]
-
-
-@dataclass(frozen=True, eq=False)
-class Round:
-    """One screening: its threshold, what was proposed, what was refined (best first) and what was decided.
-
-    ``objections``: why each of the first refined ones was not accepted, "" for the one that was. ``rivals``: other
-    effects that explain the held-out recordings as well as the accepted one, within the uncertainty; ``forms``: other
-    forms of it that do. ``factors`` (N,): how the residuals of the fit recordings were weighed.
-    """
-
-    threshold: float
-    proposals: tuple[Proposal, ...]
-    scored: tuple[Scored, ...]
-    accepted: Scored | None
-    objections: tuple[str, ...]
-    rivals: tuple[Scored, ...]
-    gains: FloatArray
-    factors: FloatArray
-    forms: tuple[Scored, ...] = ()
-
-    @property
-    def folded(self) -> "Round":
-        """The same without the Jacobians of what was only weighed; errors are compared with those of the rivals."""
-        whole = {id(s) for s in (self.accepted, *self.rivals, *self.forms)}
-        return replace(self, scored=tuple(s if id(s) in whole else s.folded for s in self.scored))
-
-    @property
-    def without_responses(self) -> "Round":
-        """The same without the responses of what was not refined: those of the first round tell what is alike."""
-        refined = {id(s.proposal) for s in (*self.scored, *self.rivals)}
-        return replace(self, proposals=tuple(p if id(p) in refined else p.summary for p in self.proposals))
-
-    def with_accepted(self, choice: Scored) -> "Round":
-        """The same with ``choice`` in place of the accepted one."""
-        old = self.accepted
-        if old is None or old.proposal is choice.proposal:
-            return self
-        proposals = tuple(choice.proposal if p is old.proposal else p for p in self.proposals)
-        scored = tuple(choice if s.proposal is old.proposal else s for s in self.scored)
-        return replace(self, proposals=proposals, scored=scored, accepted=choice)
-
-    def probability(self, gain: float) -> float:
-        """Probability that chance makes at least ``gain``."""
-        return probability(gain, self.gains)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +52,8 @@ class Attribution:
 
     ``base_cost``: of the declared model's fit without weights, the prior's share included.
     ``base_validate``, ``final_validate`` (N,): held-out residuals of both, in standard deviations of the noise.
-    ``factors`` (N,): how the fit recordings' residuals of ``final`` are weighed.
+    ``factors`` (N,): how the fit recordings' residuals of ``final`` are weighed. ``sticking``: the names of effects
+    that were found, or gone on from, with the model kept in step, be they dropped since.
     """
 
     base: Fit
@@ -111,7 +64,8 @@ class Attribution:
     base_validate: FloatArray
     final_validate: FloatArray
     factors: FloatArray
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
+    sticking: tuple[str, ...] = ()
 
     @property
     def plain_final(self) -> Fit:
@@ -220,6 +174,7 @@ def attribute(
     rounds: list[Round] = []
     accepted: list[Scored] = []
     said: list[str] = []
+    sticking: list[str] = []
     pool = candidates
     begun = begin(weights, base, held)
     if begun is not None:
@@ -245,6 +200,7 @@ def attribute(
                 if otherwise is not None and otherwise.accepted:
                     begun, rounds, accepted = otherwise, [*otherwise.rounds], [*otherwise.accepted]
                     current, current_held = otherwise.fit, otherwise.held
+                    sticking = [s.candidate.name for s in accepted]
                     break
                 screened = screened.beside(() if otherwise is None else otherwise.tried)
             rounds.append(_round(selection, left, screened, own, accepted, offered is pool, deep).folded)
@@ -267,6 +223,7 @@ def attribute(
                     led = way.found[1] is not fit
                     choice, fit, current_held = way.found
                     rounds[-1] = replace(rounds[-1], forms=way.ways)
+                    sticking.append(choice.candidate.name)
                     said.append(choice.candidate.name + (CONTINUED if led else NOT_CONTINUED))
                     said += [way.note] if way.note else []
                     more, others = way.rounds, way.beside
@@ -290,7 +247,9 @@ def attribute(
             return None
         accepted, current, current_held, ended = kept
         notes += ended
-        rounds = _with_places(bench, rounds, accepted, current, current_held, candidates, machine)
+        whole = asked_again(bench, unknowns, Model(tuple(rounds), tuple(accepted), current, current_held), say)
+        accepted, current, current_held = list(whole.accepted), whole.fit, whole.held
+        rounds = _with_places(bench, whole.rounds, accepted, current, current_held, candidates, machine)
     return Attribution(
         base,
         base_cost,
@@ -301,6 +260,7 @@ def attribute(
         weights.plain(current_held, "validate"),
         bench.factors("fit"),
         (*(begun.notes if begun is not None else ()), *said, *notes),
+        tuple(sticking),
     )
 
 
@@ -324,7 +284,7 @@ def shallow_round(
         choice, scored, objections = found.accepted, list(found.scored), found.objections
         better = selection.overtaking(choice, scored)
         if better is not None:
-            choice, (scored, objections) = better, _taken_over(better, scored, objections)
+            choice, (scored, objections) = better, taken_over(better, scored, objections)
         rivals = selection.rivals(choice, scored, {s.candidate.effect.name for s in accepted})
         found = replace(found, accepted=choice, scored=tuple(scored), objections=objections, rivals=rivals)
     return found.folded
@@ -442,23 +402,10 @@ def _round(
         choice = selection.overtaking(choice, scored) or choice
         choice, forms = best_form(selection, choice, scored, proposals, offered)
         if choice is not first:
-            scored, objections = _taken_over(choice, scored, objections)
+            scored, objections = taken_over(choice, scored, objections)
         if choice.proposal not in proposals:
             proposals = [choice.proposal, *proposals]
         scored += selection.elsewhere(choice, scored, proposals)
         rivals = selection.rivals(choice, scored, {s.candidate.effect.name for s in accepted})
     factors = selection.bench.factors("fit")
     return Round(limit, tuple(proposals), tuple(scored), choice, objections, rivals, gains, factors, forms)
-
-
-def _taken_over(
-    choice: Scored, scored: Sequence[Scored], objections: Sequence[str]
-) -> tuple[list[Scored], tuple[str, ...]]:
-    """What was refined, and its objections, with a better form in the first place."""
-    others = [(s, why) for s, why in zip_longest(scored, objections) if s.proposal is not choice.proposal]
-    whys = [
-        why or (TAKEN if s.candidate.name == choice.candidate.name else APART)
-        for s, why in others
-        if why is not None
-    ]
-    return [choice, *(s for s, _ in others)], ("", *whys)

@@ -7,8 +7,9 @@ import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.declared import DeclaredEffect
 from thsa_cosim.diagnosis.catalogue.known import known_effects
-from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round, round_of
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, round_of
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine, Order, name_by_order
+from thsa_cosim.diagnosis.choosing.rounds import Round
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit

@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thsa_cosim.diagnosis.catalogue.candidate import Candidate
-from thsa_cosim.diagnosis.choosing.attribution import Attribution, Begun, Round, Scan, attribute
+from thsa_cosim.diagnosis.choosing.attribution import Attribution, Begun, Scan, attribute
 from thsa_cosim.diagnosis.choosing.chance import largest_gains, threshold
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, insignificant, out_of_range
 from thsa_cosim.diagnosis.choosing.observer import order_in_step
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.ripples import on_orders
+from thsa_cosim.diagnosis.choosing.rounds import Round
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, judge, refit, score
 from thsa_cosim.diagnosis.choosing.screen import Proposal, propose
 from thsa_cosim.diagnosis.choosing.selection import Say

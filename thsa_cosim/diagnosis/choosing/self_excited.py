@@ -22,7 +22,6 @@ from thsa_cosim.diagnosis.choosing.attribution import (
     NO_MORE,
     Continued,
     Judged,
-    Round,
     Scan,
     shallow_round,
 )
@@ -30,8 +29,9 @@ from thsa_cosim.diagnosis.choosing.curves import falls, nearest
 from thsa_cosim.diagnosis.choosing.forms import is_form
 from thsa_cosim.diagnosis.choosing.gates import insignificant, out_of_range
 from thsa_cosim.diagnosis.choosing.orders import Machine
+from thsa_cosim.diagnosis.choosing.rounds import Round
 from thsa_cosim.diagnosis.choosing.score import ENOUGH, Scored
-from thsa_cosim.diagnosis.choosing.screen import Proposal
+from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
 from thsa_cosim.diagnosis.choosing.selection import Say, Selection
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.ensemble import descent
@@ -55,11 +55,11 @@ MOVES, HALF, SHARE = (0.01, 0.9), 0.5, 0.1
 #: After so many rounds the forms go on that leave no more than so many times the least of all; after as many more only
 #: the best does. Set while looking at three simulated units: the true form was ahead by 3 to 60 % after five rounds.
 ROUNDS, ALIKE = 5, 1.1
-#: The way is given up where all of them leave more than so many variances of the spectra's noise after the first and
-#: the second of these rounds: something else is missing, or the form is none of them. Set while looking at nine
-#: simulated units: 1.8 and 1.7 to 1.8 where it led to the machine, 2.5 to 4 and 2.9 to 3.3 where it ended beside it, 18
-#: to 51 after the first with another friction or beside a second effect.
-LOST = (10.0, 2.5)
+#: The way is given up where all of them leave more than so many variances of the spectra's noise after the FIRST
+#: round, after the ROUNDS above, and after twice as many: something else is missing, or the form is none of them. Set
+#: while looking at twenty simulated units: 1.8 to 9, 1.6 to 3.4 and 1.7 to 1.8 where it led to the machine or near it,
+#: 14 and more, 4.1 and more and 2.5 to 4 where it ended beside it, with another friction or beside a second effect.
+FIRST, LOST = 1, (12.0, 4.0, 2.5)
 #: In step nothing else is missing if no signal leaves more than this many standard deviations of its noise. Set while
 #: looking at the same: 1.00 to 1.015 with nothing else, from 1.06 on with a wrong effect.
 ALONE = 1.05
@@ -67,6 +67,8 @@ ALONE = 1.05
 ROUGH = 2.0
 #: Else what is missing beside it is looked for in step, where that promises this share of what is left.
 LEAST = 0.1
+#: It is looked for in the fit recording that leaves most; in all of them where it promises this share of LEAST there.
+GLANCE = 0.3
 #: What does less than this share of all that it does to the other signals is taken for a following machine's own.
 SHOWN = 1e-3
 #: Fits of the spectra and of the free run with all unknowns, which follow.
@@ -160,9 +162,16 @@ class SelfExcited:
             return None
         others = [c for c in self.candidates if c.effect.name != stepped.candidate.effect.name]
         self.say(f"screening {len(others)} candidates in step beside {stepped.candidate.name}")
+        waves = self.scan(fit)
+        one, part = _worst(bench, fit)
+        looked = screen(one, part, others, waves)
+        hidden = _hidden(looked, one, channel)
+        telling = {p.candidate.key for p in looked if p.gain >= GLANCE * LEAST * part.misfit}
+        others = [c for c in others if c.key in telling]
+        if not others:
+            return stepped, (), hidden
         selection = Selection(bench, weights, fit, held, self.say, whole=False)
-        found = shallow_round(selection, others, self.scan(fit), [stepped], self.seed, self.machine, LEAST)
-        hidden = _hidden(found.proposals, bench, channel)
+        found = shallow_round(selection, others, waves, [stepped], self.seed, self.machine, LEAST)
         if found.accepted is None:
             return stepped, (), hidden
         other = found.accepted.fit
@@ -243,16 +252,17 @@ class SelfExcited:
             lasts = {k: deque(islice(rounds[k], count), maxlen=1) for k in which}
             return {k: last[0] for k, last in lasts.items() if last}
 
-        reached = further(range(len(ways)), ROUNDS)
-        if not reached:
+        reached = further(range(len(ways)), FIRST)
+        noise = spectra.size("fit") if reached else 0
+        if not any(cost <= LOST[0] * noise for _, cost in reached.values()):
             return None
-        noise = spectra.size("fit")
+        reached |= further(reached, ROUNDS - FIRST)
         least = min(cost for _, cost in reached.values())
-        if least > LOST[0] * noise:
+        if least > LOST[1] * noise:
             return None
         reached |= further([k for k, (_, cost) in reached.items() if cost <= ALIKE * least], ROUNDS)
         best = min(reached, key=lambda k: reached[k][1])
-        if reached[best][1] > LOST[1] * noise:
+        if reached[best][1] > LOST[2] * noise:
             return None
         reached |= further([best], None)
         one, unknowns, _, steps = ways[best]
@@ -286,6 +296,16 @@ class SelfExcited:
 def _leaves_much(bench: Bench, fit: Fit) -> bool:
     """Whether the free run of ``fit`` is out of step with the machine, or much else is missing."""
     return float(np.mean((fit.residual / bench.factors("fit")) ** 2)) > ROUGH
+
+
+def _worst(bench: Bench, fit: Fit) -> tuple[Bench, Fit]:
+    """The fit recording alone that leaves most beside the noise, and ``fit`` there."""
+    trials, parts, begin = bench.of("fit"), [], 0
+    for trial in trials:
+        parts.append(slice(begin, begin := begin + sum(c.measured.size for c in trial.case.channels)))
+    left = [float(np.mean(fit.residual[part] ** 2)) for part in parts]
+    worst = int(np.argmax(left))
+    return bench.alone(trials[worst]), fit.rows(parts[worst])
 
 
 def _hidden(proposals: Sequence[Proposal], bench: Bench, channel: str) -> list[Candidate]:

@@ -11,9 +11,10 @@ from itertools import islice, permutations, product
 import numpy as np
 
 from thsa_cosim.batch import Experiment, Job, Runner, Status
-from thsa_cosim.diagnosis.choosing.attribution import Attribution, Round
+from thsa_cosim.diagnosis.choosing.attribution import Attribution
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS
 from thsa_cosim.diagnosis.choosing.places import is_same_law
+from thsa_cosim.diagnosis.choosing.rounds import Round
 from thsa_cosim.diagnosis.choosing.score import Scored, fixed_shapes
 from thsa_cosim.diagnosis.choosing.selection import APART_SHARE
 from thsa_cosim.diagnosis.choosing.verdict import SIGNIFICANT, VISIBLE, is_visible

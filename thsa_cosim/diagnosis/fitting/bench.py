@@ -1,6 +1,7 @@
 """Vectors of unknowns → residuals of the recordings, by batches over an engine."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,6 +92,12 @@ class Bench:
         made = Bench(runner, trials, {**self._fixed, **fixed})
         made.failures, made.weights = self.failures, self.weights
         self._beside.append(made)
+        return made
+
+    def alone(self, trial: Trial) -> "Bench":
+        """The same with one ``trial`` of its own only; its runs count with this one's."""
+        made = copy(self)
+        made.trials, made._beside = (trial,), []
         return made
 
     def go_over(self, other: "Bench") -> None:

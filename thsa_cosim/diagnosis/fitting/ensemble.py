@@ -23,7 +23,7 @@ SHARE = 0.3
 #: A round that gains less than this share narrows the ensemble by that factor, one that gains more widens it again.
 SLOW, NARROWER, WIDER = 0.005, 0.3, 1.5
 #: It ends after so many rounds in a row that gained less than that share, or so many in all.
-PATIENCE, SETTLED, ROUNDS = 3, 0.002, 24
+PATIENCE, SETTLED, ROUNDS = 3, 0.005, 24
 #: No step is longer than so many spreads in each unknown, as a root mean square.
 REACH = 2.0
 #: Steps are tried with these dampings, in shares of the cost per unknown, at half their length, ...

@@ -85,6 +85,12 @@ class Fit:
         which = self.unknowns.index(unknowns.names)
         return np.asarray(self.steps[which] * self.unknowns.scale[which] / unknowns.scale)
 
+    def rows(self, part: slice) -> "Fit":
+        """The same fit with a ``part`` of its residuals and of the Jacobian's rows only."""
+        residual, own = self.residual[part], self.jacobian[part]
+        cost = cost_of(self.unknowns, self.vector, residual)
+        return replace(self, residual=residual, own=own, shared=None, cost=cost)
+
     @property
     def misfit(self) -> float:
         """Sum of squared residuals without the prior's."""

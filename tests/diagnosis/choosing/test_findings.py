@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from thsa_cosim.diagnosis.catalogue.known import known_effects
-from thsa_cosim.diagnosis.choosing.rounds import Round
 from thsa_cosim.diagnosis.choosing.chance import probability
 from thsa_cosim.diagnosis.choosing.findings import (
     NO_MORE,
@@ -22,6 +21,7 @@ from thsa_cosim.diagnosis.choosing.findings import (
     values_of,
 )
 from thsa_cosim.diagnosis.choosing.orders import Machine, Order
+from thsa_cosim.diagnosis.choosing.rounds import Round
 from thsa_cosim.diagnosis.choosing.screen import Proposal
 from thsa_cosim.diagnosis.fitting.fit import Fit
 from thsa_cosim.diagnosis.fitting.unknowns import Unknown, Unknowns

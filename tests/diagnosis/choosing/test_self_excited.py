@@ -453,3 +453,39 @@ def test_forms_are_compared_by_spectra_and_the_best_one_is_gone_on_with():
     made = continued(own, weights, found, Following(own), FORMS)
     assert made is not None
     assert made.found[0].candidate is found[0].candidate, "the form that is true stays"
+
+
+def test_the_recording_that_leaves_most_is_looked_at_alone():
+    own, _weights, found, _offered = with_drag()
+    trial = next(t for t in own.trials if t.part == "fit")
+    channels = [replace(c, measured=c.measured + 5.0 * c.noise) for c in trial.case.channels]
+    worse = replace(trial, case=replace(trial.case, channels=tuple(channels)))
+    own.trials = (*own.trials, worse)
+    size, fit = found[1].residual.size, found[1]
+    both = replace(
+        fit,
+        residual=np.concatenate([fit.residual, fit.residual - 5.0]),
+        own=np.concatenate([fit.jacobian, 2.0 * fit.jacobian]),
+        shared=None,
+    )
+    alone, part = room._worst(own, both)
+    assert alone.trials == (worse,)
+    np.testing.assert_array_equal(part.residual, both.residual[size:])
+    np.testing.assert_array_equal(part.jacobian, 2.0 * fit.jacobian)
+    prior = fit.unknowns.prior(fit.vector)
+    assert part.cost == pytest.approx(part.misfit + prior @ prior)
+    before = own.evaluations
+    (residual,) = alone.residuals(fit.unknowns, fit.vector[None, :], "fit")
+    assert residual is not None
+    assert residual.size == size
+    assert own.evaluations == before + 1, "its runs count"
+
+
+def test_what_promises_little_in_that_recording_is_not_looked_at_in_the_others(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    own, weights, found, offered = with_drag()
+    monkeypatch.setattr(room, "GLANCE", np.inf)
+    made = way(own, Following(own), offered).continued(weights, found)
+    assert made is not None
+    assert (made.beside, made.rounds, made.left) == ((), (), [])

@@ -13,7 +13,7 @@ import numpy as np
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, insignificant, out_of_range
 from thsa_cosim.diagnosis.choosing.rounds import APART, Round, taken_over
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns
-from thsa_cosim.diagnosis.choosing.selection import Say
+from thsa_cosim.diagnosis.choosing.selection import TIE_SHARE, Say
 from thsa_cosim.diagnosis.fitting.bench import Bench
 from thsa_cosim.diagnosis.fitting.fit import Fit, refine
 from thsa_cosim.diagnosis.fitting.structure import block_gains, consistency
@@ -26,7 +26,7 @@ ASKED = 2
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The ``rounds``, the effects ``accepted`` in them, the model's ``fit`` with these and its held-out residuals (N,)."""
+    """The ``rounds``, the effects ``accepted`` in them, the model's ``fit`` with them, its held-out residuals (N,)."""
 
     rounds: tuple[Round, ...]
     accepted: tuple[Scored, ...]
@@ -38,7 +38,8 @@ def asked_again(bench: Bench, unknowns: Unknowns, model: Model, say: Say) -> Mod
     """``model``, whose effects were each compared with their rivals while all later ones were in.
 
     A rival that fits better, by three standard errors, and explains the held-out recordings as well takes the effect's
-    place; one that fits as well is a tie. ``unknowns``: of the declared model.
+    place; one that fits as well, but for a small share of what the effect explains, is a tie. ``unknowns``: of the
+    declared model.
     """
     for one in model.accepted[:-1]:
         number = next(
@@ -77,18 +78,17 @@ def _in_place(bench: Bench, unknowns: Unknowns, model: Model, one: Scored, rival
     """``rival`` in the place of ``one`` in the whole model, fitted; None if that is no model or explains less."""
     kept = [rival if s is one else s for s in model.accepted]
     wider = extended_unknowns(unknowns, kept)
-    now, then, theirs = (f.unknowns.named(f.vector) for f in (model.fit, one.fit, rival.fit))
-    # What the rival bent otherwise than the effect did, while both had the same missing beside them.
-    apart = {name: theirs[name] - then[name] for name in theirs if name in then}
-    start = [now[u.name] + apart.get(u.name, 0.0) if u.name in now else theirs[u.name] for u in wider.members]
+    # What was missing beside the rival bent the declared parameters: those of the whole model are nearer.
+    known = {**rival.fit.unknowns.named(rival.fit.vector), **model.fit.unknowns.named(model.fit.vector)}
+    start = [known[name] for name in wider.names]
     fit = refine(bench, wider, np.array(start), enough=3.0, to_beat=model.fit.cost)
-    if fit is None or fit.cost > model.fit.cost + _margin(model) or out_of_range(fit):
+    if fit is None or fit.cost > model.fit.cost + _worth(model, one) or out_of_range(fit):
         return None
     (held,) = bench.residuals(wider, fit.vector[None, :], "validate")
     if held is None:
         return None
     lead = block_gains(bench.of("validate"), held, model.held)
-    if consistency(lead) >= SIGMAS and float(np.sum(lead)) >= SIGMAS**2:
+    if consistency(lead) >= SIGMAS and float(np.sum(lead)) >= _worth(model, one):
         return None
     found = replace(rival, fit=fit, validate=held)
     return None if insignificant(found) else found
@@ -99,7 +99,14 @@ def _margin(model: Model) -> float:
     return SIGMAS**2 * model.fit.inflation
 
 
-def _decided(model: Model, number: int, one: Scored, asked: Sequence[Scored], found: Sequence[Scored]) -> Model:
+def _worth(model: Model, one: Scored) -> float:
+    """By how much a rival of ``one`` may fit worse and be its tie: within chance, or a share of what that explains."""
+    return max(_margin(model), TIE_SHARE * one.held_out_gain)
+
+
+def _decided(
+    model: Model, number: int, one: Scored, asked: Sequence[Scored], found: Sequence[Scored]
+) -> Model:
     """``model`` with what was ``found`` of the ``asked`` to explain as much as ``one``, of round ``number``.
 
     What was asked and not found is no tie any more.
@@ -117,7 +124,9 @@ def _decided(model: Model, number: int, one: Scored, asked: Sequence[Scored], fo
         kept = replace(kept, accepted=best, rivals=(*ties, *found))
     else:
         scored, objections = taken_over(best, kept.scored, kept.objections)
-        near = tuple(s for s in found if s is not best and s.fit.cost <= fit.cost + _margin(model))
-        kept = replace(kept, accepted=best, scored=tuple(scored), objections=objections, rivals=near, forms=())
+        near = tuple(s for s in found if s is not best and s.fit.cost <= fit.cost + _worth(model, one))
+        kept = replace(
+            kept, accepted=best, scored=tuple(scored), objections=objections, rivals=near, forms=()
+        )
     rounds = (*model.rounds[:number], kept.folded, *model.rounds[number + 1 :])
     return Model(rounds, tuple(best if s is one else s for s in model.accepted), fit, held)

@@ -247,7 +247,9 @@ def attribute(
             return None
         accepted, current, current_held, ended = kept
         notes += ended
-        whole = asked_again(bench, unknowns, Model(tuple(rounds), tuple(accepted), current, current_held), say)
+        whole = asked_again(
+            bench, unknowns, Model(tuple(rounds), tuple(accepted), current, current_held), say
+        )
         accepted, current, current_held = list(whole.accepted), whole.fit, whole.held
         rounds = _with_places(bench, whole.rounds, accepted, current, current_held, candidates, machine)
     return Attribution(

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice
+from itertools import accumulate, islice
 
 import numpy as np
 
@@ -300,9 +300,9 @@ def _leaves_much(bench: Bench, fit: Fit) -> bool:
 
 def _worst(bench: Bench, fit: Fit) -> tuple[Bench, Fit]:
     """The fit recording alone that leaves most beside the noise, and ``fit`` there."""
-    trials, parts, begin = bench.of("fit"), [], 0
-    for trial in trials:
-        parts.append(slice(begin, begin := begin + sum(c.measured.size for c in trial.case.channels)))
+    trials = bench.of("fit")
+    sizes = [sum(c.measured.size for c in t.case.channels) for t in trials]
+    parts = [slice(end - size, end) for size, end in zip(sizes, accumulate(sizes), strict=True)]
     left = [float(np.mean(fit.residual[part] ** 2)) for part in parts]
     worst = int(np.argmax(left))
     return bench.alone(trials[worst]), fit.rows(parts[worst])

@@ -84,7 +84,9 @@ def test_the_order_that_showed_before_the_declared_parameters_were_fitted_in_ste
 @pytest.mark.parametrize("locks", [0, 1, None])
 def test_the_free_run_is_tried_again_with_what_joined(monkeypatch: pytest.MonkeyPatch, locks: int | None):
     """``locks``: how many effects have to join before the free run does."""
-    ways, freed = [object(), object()], object()
+    ripple = SimpleNamespace(candidate=candidates("cogging")[0])
+    ways: list[Any] = [SimpleNamespace(accepted=(ripple,)) for _ in range(2)]
+    freed = object()
     tried: list[object] = []
 
     def let_free(
@@ -113,3 +115,44 @@ def test_the_free_run_is_tried_again_with_what_joined(monkeypatch: pytest.Monkey
         assert made.accepted == (), "the search goes on from the declared model"
     else:
         assert made is freed
+
+
+def test_where_nothing_repeats_with_the_position_the_model_is_not_let_free(monkeypatch: pytest.MonkeyPatch):
+    other = SimpleNamespace(candidate=candidates("windage")[0])
+    whole = SimpleNamespace(accepted=(other,))
+    monkeypatch.setattr(room, "leaves_structure", lambda *_given: True)
+    monkeypatch.setattr(room, "attribute", lambda *_given, **_more: object())
+    monkeypatch.setattr(InStep, "_order", lambda *_given: (87.0, 2.0 * SHARE))
+    monkeypatch.setattr(InStep, "_added", lambda *_given: None)
+    monkeypatch.setattr(InStep, "_whole", lambda *_given: whole)
+    following = SimpleNamespace(
+        followed=lambda *_given: SimpleNamespace(slot=SimpleNamespace(is_angular=True), channel="w_m"),
+        gain=lambda *_given: 10.0,
+        at=lambda _gain: SimpleNamespace(weights={}),
+    )
+    asks: Any = InStep(None, following, None, (), None, None, 1, lambda _: None)  # type: ignore[arg-type]
+    weights, base, held = SimpleNamespace(left=lambda _held: 1.0), SimpleNamespace(vector=None), np.zeros(1)
+    made = asks.found(weights, base, held)
+    assert (made.accepted, made.rounds) == ((), ())
+
+
+@pytest.mark.parametrize(("share", "found"), [(SHARE, True), (0.9 * SHARE, False)])
+def test_a_ripple_that_was_outweighed_joins_what_was_found_if_its_order_still_shows(
+    monkeypatch: pytest.MonkeyPatch, share: float, found: bool
+):
+    offered = candidates("cogging")
+    true = {"motorEffect.cogging.a_s": 0.25, "motorEffect.cogging.n": 12.0}
+    own = bench(offered, true, 3, held_shapes(offered))
+    base = refine(own, unknowns(), unknowns().start)
+    assert base is not None
+    (held,) = own.residuals(base.unknowns, base.vector[None, :], "validate")
+    assert held is not None
+    asks: Any = InStep(own, None, unknowns(), offered, None, NO_MACHINE, 1, lambda _: None)  # type: ignore[arg-type]
+    monkeypatch.setattr(InStep, "_order", lambda *_given: (12.0, share))
+    followed: Any = SimpleNamespace(slot=offered[0].slot)
+    so_far: Any = SimpleNamespace(
+        rounds=(), accepted=(), final=base, final_validate=held / own.factors("validate")
+    )
+    made = asks._whole(own, followed, 1.0, so_far)
+    assert [s.candidate.variant.beside for s in made.accepted] == ([False, True] if found else [])
+    assert all(s.candidate.effect.name == "cogging" for s in made.accepted)

@@ -81,6 +81,11 @@ def _round(bench: Bench, fit: Fit, proposals: Sequence[Proposal], one: Scored, s
     return Round(threshold(gains), tuple(proposals), (one,), one, ("",), (), gains, bench.factors("fit"))
 
 
+def _is_ripple(candidate: Candidate) -> bool:
+    """Whether it repeats with the position."""
+    return any(p.scanned for p in candidate.shapes)
+
+
 @dataclass(frozen=True, eq=False)
 class InStep:
     """How to find effects in step, of ``unknowns`` and ``candidates`` on ``bench``."""
@@ -136,6 +141,8 @@ class InStep:
             return otherwise
         left = min(weights.left(h) for h in (held, *(s.validate for s in otherwise.tried)))
         whole = self._whole(stepped, followed, gain, found)
+        if not any(_is_ripple(s.candidate) for s in whole.accepted):
+            return otherwise  # nothing repeats with the position once all else is in the model
         begun = self._freed(stepped, gain, weights, whole, left)
         if begun is None and (more := self._further(stepped, found, whole)) is not None:
             begun = self._freed(stepped, gain, weights, more, left)
@@ -226,14 +233,16 @@ class InStep:
         return None if own is None else Begun((made,), (one,), fit, own)
 
     def _whole(self, stepped: Bench, followed: Followed, gain: float, found: Attribution) -> Begun:
-        """What was found, the ripple if that was outweighed, and its second harmonic, neutral.
+        """What was found, the ripple if that was outweighed and still shows, and its second harmonic, neutral.
 
-        The harmonic hardly shows in step; the free run tells whether it is needed.
+        Both hardly gain in step: the force tells of the ripple, the free run whether the harmonic is needed.
         """
         rounds, accepted, fit = found.rounds, found.accepted, found.final
         held = found.final_validate * stepped.factors("validate")
-        order, _share = self._order(followed, gain, fit)
-        for harmonic in (False, True):
+        order, share = self._order(followed, gain, fit)
+        # Without a ripple so far, what showed its order may have been another effect that is in the model now.
+        shows = share >= SHARE or any(_is_ripple(s.candidate) for s in accepted)
+        for harmonic in (False, True) if shows else ():
             made = self._added(stepped, followed, (order,), fit, held, harmonic)
             if made is not None and (one := made.accepted) is not None:
                 rounds, accepted, fit, held = (*rounds, made), (*accepted, one), one.fit, one.validate

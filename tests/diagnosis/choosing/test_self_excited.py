@@ -489,3 +489,39 @@ def test_what_promises_little_in_that_recording_is_not_looked_at_in_the_others(
     made = way(own, Following(own), offered).continued(weights, found)
     assert made is not None
     assert (made.beside, made.rounds, made.left) == ((), (), [])
+
+
+@pytest.mark.parametrize(("n", "others"), [(2.5, [1.0, 2.0]), (2.2, [1.0]), (1.1, [2.0]), (1.5, [1.0, 2.0])])
+def test_every_form_sets_out_from_the_exponents_of_the_literature_with_the_curve_nearest_in_step(
+    n: float, others: list[float]
+):
+    own, _weights, (one, fit, _) = stuck()
+    vector = fit.vector.copy()
+    vector[fit.unknowns.names.index(f"{BLOCK}.n")] = n
+    ways = list(way(own, Following(own), FORMS)._starts(one, at(own, fit, vector)))
+    keys = [w.candidate.key for w, *_ in ways]
+    assert keys == [FORMS[0].key] * (1 + len(others)) + [FORMS[1].key]
+    (_, _, first, _), *rest = ways
+    np.testing.assert_array_equal(first, vector)
+    speeds = {"v": np.linspace(0.3, 30.0, 50), "s": np.ones(50)}
+
+    def force(scored: Any, unknowns: Any, x: np.ndarray) -> np.ndarray:
+        values = unknowns.named(x)
+        law = scored.candidate.variant.law
+        return np.asarray(law({p.name: values[p.variable] for p in scored.candidate.parameters}, speeds))
+
+    declared = fit.unknowns.names[: -len(one.candidate.parameters)]
+    for scored, members, x, steps in rest:
+        assert steps.shape == x.shape == (len(members.names),)
+        values = members.named(x)
+        assert [values[name] for name in declared] == [fit.unknowns.named(vector)[name] for name in declared]
+        aim = force(ways[0][0], fit.unknowns, vector)
+        assert np.max(np.abs(force(scored, members, x) - aim)) < 0.35 * np.max(np.abs(aim))
+    exponents = [u.named(x)[f"{BLOCK}.n"] for s, u, x, _ in rest if s.candidate.key == FORMS[0].key]
+    assert exponents == pytest.approx(others)
+
+
+def test_beside_a_form_without_an_exponent_the_other_one_sets_out_from_those_of_the_literature():
+    assert room._exponents(FORMS[1], FORMS[1], {}) == []
+    assert room._exponents(FORMS[0], FORMS[1], {}) == [{"n": 1.0}, {"n": 2.0}]
+    assert room._exponents(FORMS[1], FORMS[0], {f"{BLOCK}.n": 1.0}) == [{}]

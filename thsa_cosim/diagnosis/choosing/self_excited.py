@@ -9,7 +9,7 @@ find the optimum. The cycles add up the solver's errors: the free run is simulat
 """
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import accumulate, islice
@@ -60,6 +60,9 @@ ROUNDS, ALIKE = 5, 1.1
 #: while looking at twenty simulated units: 1.8 to 9, 1.6 to 3.4 and 1.7 to 1.8 where it led to the machine or near it,
 #: 14 and more, 4.1 and more and 2.5 to 4 where it ended beside it, with another friction or beside a second effect.
 FIRST, LOST = 1, (12.0, 4.0, 2.5)
+#: The exponents of the literature are ways of their own where the one in step is not nearer to them than this factor:
+#: beside noise that was amplified with what a lag took away, it comes out too large.
+EXPONENTS, SAME = (1.0, 2.0), 1.2
 #: In step nothing else is missing if no signal leaves more than this many standard deviations of its noise. Set while
 #: looking at the same: 1.00 to 1.015 with nothing else, from 1.06 on with a wrong effect.
 ALONE = 1.05
@@ -274,15 +277,22 @@ class SelfExcited:
         return None if fit is None else replace(one, fit=fit)
 
     def _starts(self, choice: Scored, fit: Fit) -> Iterator[tuple[Scored, Unknowns, FloatArray, FloatArray]]:
-        """``choice`` and its other forms, with the unknowns of the whole model, where they start, and steps (n,)."""
+        """Ways of ``choice`` and its other forms: the unknowns of the whole model, where they start, and steps (n,).
+
+        A form with an exponent sets out from each of the literature's, with the curve nearest the one in step.
+        """
         yield choice, fit.unknowns, fit.vector, fit.steps
         values = _values(choice, fit)
         own = {p.variable for p in choice.candidate.parameters}
-        shared = {p.name for p in choice.candidate.parameters}
-        for other in (c for c in self.candidates if is_form(c, choice.candidate)):
-            held = {p.name: p.starts[0] for p in other.shapes if p.name not in shared}
-            curve = nearest(other, held, choice.candidate, values)
-            if curve is not None and len(other.coefficients) == len(choice.candidate.coefficients):
+        for other in (
+            c for c in self.candidates if is_form(c, choice.candidate) or c.key == choice.candidate.key
+        ):
+            if len(other.coefficients) != len(choice.candidate.coefficients):
+                continue
+            for held in _exponents(other, choice.candidate, values):
+                curve = nearest(other, held, choice.candidate, values)
+                if curve is None:
+                    continue
                 shapes = {p.name: curve[p.variable] for p in other.shapes}
                 kept = Unknowns(tuple(u for u in fit.unknowns.members if u.name not in own))
                 unknowns = kept.with_members(added := unknowns_of(other, shapes))
@@ -291,6 +301,17 @@ class SelfExcited:
                 proposal = replace(choice.proposal, candidate=other, shapes=shapes, held=frozenset())
                 steps = np.concatenate([fit.steps_of(kept), np.full(len(added), 1e-2)])
                 yield replace(choice, proposal=proposal), unknowns, vector, steps
+
+
+def _exponents(candidate: Candidate, like: Candidate, values: Mapping[str, float]) -> list[dict[str, float]]:
+    """What the candidate's curves keep, by name, that are near the one of ``like`` at ``values`` (by variable).
+
+    Nothing for a form without an exponent, unless it is ``like`` itself.
+    """
+    if "n" not in {p.name for p in candidate.parameters}:
+        return [] if candidate.key == like.key else [{}]
+    known = [values[p.variable] for p in like.parameters if p.name == "n" and candidate.key == like.key]
+    return [{"n": n} for n in EXPONENTS if not any(max(n / k, k / n) < SAME for k in known)]
 
 
 def _leaves_much(bench: Bench, fit: Fit) -> bool:

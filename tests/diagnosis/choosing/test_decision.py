@@ -153,6 +153,30 @@ def test_effects_that_are_found_in_another_way_where_the_search_is_stuck_are_all
     assert "a note" in found.notes
 
 
+@pytest.mark.parametrize("in_step", [True, False])
+def test_a_free_run_that_is_out_of_step_drops_nothing_that_was_judged_in_step(in_step: bool):
+    """Of two effects that were found one is needless: a free run that is lost cannot know."""
+    true = {**WINDAGE, **STRIBECK}
+    both = diagnosed(true, most=2)
+    assert len(both.accepted) == 2
+    # Of a machine without the first of them.
+    own = bench(
+        candidates(*NAMES), STRIBECK if both.accepted[0].candidate.effect.name == "windage" else WINDAGE
+    )
+    (held,) = own.residuals(both.final.unknowns, both.final.vector[None, :], "validate")
+    fit = refine(own, both.final.unknowns, both.final.vector)
+    assert held is not None
+    assert fit is not None
+
+    def stuck(_weights: ChannelWeights, _base: Fit, _held: np.ndarray) -> Begun:
+        return Begun(both.rounds, both.accepted, fit, held, in_step=in_step)
+
+    found = attribute(own, unknowns(), candidates("cogging"), lambda _: {}, seed=1, stuck=stuck)
+    assert found is not None
+    assert len(found.accepted) == (2 if in_step else 1)
+    assert found.sticking == tuple(s.candidate.name for s in both.accepted)
+
+
 def test_what_promises_less_than_the_least_share_of_what_is_left_is_not_fitted():
     offered = candidates(*NAMES)
     for least, count in ((0.0, 1), (0.5, 1), (0.999, 0)):

@@ -1,5 +1,6 @@
 """What is found in step: who joins where the free run is lost without it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 from diagnosis.analytic import bench, candidates, unknowns
 from thsa_cosim.diagnosis.choosing import in_step as room
 from thsa_cosim.diagnosis.choosing.attribution import Begun
-from thsa_cosim.diagnosis.choosing.in_step import FURTHER, LEAST, SHARE, InStep
+from thsa_cosim.diagnosis.choosing.in_step import FURTHER, LEAST, LOST, SHARE, InStep
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE
 from thsa_cosim.diagnosis.choosing.score import held_shapes
 from thsa_cosim.diagnosis.choosing.screen import screen
@@ -134,6 +135,31 @@ def test_where_nothing_repeats_with_the_position_the_model_is_not_let_free(monke
     weights, base, held = SimpleNamespace(left=lambda _held: 1.0), SimpleNamespace(vector=None), np.zeros(1)
     made = asks.found(weights, base, held)
     assert (made.accepted, made.rounds) == ((), ())
+
+
+def test_what_was_found_beside_a_ripple_is_judged_in_step_where_the_free_run_is_lost():
+    own, nothing, found = screened()
+    whole = further(own, found, nothing)
+    assert whole is not None
+    asks: Any = SimpleNamespace(bench=own)
+    made = InStep._judged_in_step(asks, whole)
+    assert made is not None
+    assert (made.in_step, made.accepted, made.rounds, made.notes) == (
+        True,
+        whole.accepted,
+        whole.rounds,
+        (LOST,),
+    )
+    assert made.fit.unknowns.names == whole.fit.unknowns.names
+    (held,) = own.residuals(made.fit.unknowns, made.fit.vector[None, :], "validate")
+    np.testing.assert_array_equal(made.held, held)
+    ripple: Any = SimpleNamespace(candidate=candidates("cogging")[0])
+    assert InStep._judged_in_step(asks, replace(whole, accepted=(ripple,))) is None, (
+        "the free run finds that itself"
+    )
+    assert InStep._judged_in_step(asks, replace(whole, accepted=(ripple, *whole.accepted))) is not None
+    own.residuals = lambda _u, vectors, _part: [None] * len(vectors)  # type: ignore[method-assign]
+    assert InStep._judged_in_step(asks, whole) is None
 
 
 @pytest.mark.parametrize(("share", "found"), [(SHARE, True), (0.9 * SHARE, False)])

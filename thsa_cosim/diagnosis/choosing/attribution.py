@@ -85,7 +85,7 @@ class Begun:
     """What was found in another way than by screening: rounds, effects, the model's fit with them, and what to note.
 
     ``held`` (N,): its held-out residuals. ``tried``: further fits that count in the first round as those of the
-    screening do.
+    screening do. ``in_step``: the free run says nothing of which effects are needless.
     """
 
     rounds: tuple[Round, ...]
@@ -94,6 +94,7 @@ class Begun:
     held: FloatArray
     notes: tuple[str, ...] = ()
     tried: tuple[Scored, ...] = ()
+    in_step: bool = False
 
 
 #: The weights, the declared model's fit, and its held-out residuals (N,) → what is found at once.
@@ -238,18 +239,19 @@ def attribute(
         if offered is pool:
             break
     notes: list[str] = []
+    lost = begun is not None and begun.in_step
     if not settled:  # else what is left may be what bends the model
-        accepted, current, current_held, notes = prune(
-            bench, unknowns, weights, accepted, current, current_held, VISIBLE_BESIDE
-        )
+        if not lost:
+            accepted, current, current_held, notes = prune(
+                bench, unknowns, weights, accepted, current, current_held, VISIBLE_BESIDE
+            )
         kept = within_range(bench, unknowns, accepted, base, current, current_held)
         if kept is None:
             return None
         accepted, current, current_held, ended = kept
         notes += ended
-        whole = asked_again(
-            bench, unknowns, Model(tuple(rounds), tuple(accepted), current, current_held), say
-        )
+        whole = Model(tuple(rounds), tuple(accepted), current, current_held)
+        whole = whole if lost else asked_again(bench, unknowns, whole, say)
         accepted, current, current_held = list(whole.accepted), whole.fit, whole.held
         rounds = _with_places(bench, whole.rounds, accepted, current, current_held, candidates, machine)
     return Attribution(

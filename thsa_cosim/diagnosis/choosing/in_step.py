@@ -58,6 +58,12 @@ NOTE = (
     " stick and slip; they were fitted to the free run from there"
 )
 
+#: What is said where the free run with what was found in step falls out of step.
+LOST = (
+    "effects were looked for with the model kept in step with a measured speed, since a ripple may make the machine"
+    " stick and slip; the free run with them falls out of step with the machine, so they were judged in step"
+)
+
 
 def _beside(fit: Fit, proposal: Proposal) -> Fit:
     """``fit`` with the parameters of a further part, which is neutral so far."""
@@ -146,7 +152,25 @@ class InStep:
         begun = self._freed(stepped, gain, weights, whole, left)
         if begun is None and (more := self._further(stepped, found, whole)) is not None:
             begun = self._freed(stepped, gain, weights, more, left)
+        if begun is None:
+            begun = self._judged_in_step(whole)
         return otherwise if begun is None else begun
+
+    def _judged_in_step(self, whole: Begun) -> Begun | None:
+        """``whole`` as it runs freely, out of step; None if it holds nothing but ripples, or does not run.
+
+        A free run that is lost knows nothing of what else is missing: an effect that passed the gates in step does.
+        """
+        if all(_is_ripple(s.candidate) for s in whole.accepted):
+            return None
+        unknowns, vector = whole.fit.unknowns, whole.fit.vector
+        fit = refine(self.bench, unknowns, vector, steps=whole.fit.steps, iterations=1)
+        if fit is None:
+            return None
+        (held,) = self.bench.residuals(unknowns, fit.vector[None, :], "validate")
+        if held is None:
+            return None
+        return Begun(whole.rounds, whole.accepted, fit, held, notes=(LOST,), in_step=True)
 
     def _freed(
         self, stepped: Bench, gain: float, weights: ChannelWeights, whole: Begun, left: float

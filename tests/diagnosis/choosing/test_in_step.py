@@ -82,6 +82,23 @@ def test_the_order_that_showed_before_the_declared_parameters_were_fitted_in_ste
     assert made.accepted[0].proposal.shapes["n"] == 12.0
 
 
+def found_with(monkeypatch: pytest.MonkeyPatch, whole: Any, order: float) -> Any:
+    """What is found where an ``order`` shows and ``whole`` is all that is found in step."""
+    monkeypatch.setattr(room, "leaves_structure", lambda *_given: True)
+    monkeypatch.setattr(room, "attribute", lambda *_given, **_more: object())
+    monkeypatch.setattr(InStep, "_order", lambda *_given: (order, 2.0 * SHARE))
+    monkeypatch.setattr(InStep, "_added", lambda *_given: None)
+    monkeypatch.setattr(InStep, "_whole", lambda *_given: whole)
+    following = SimpleNamespace(
+        followed=lambda *_given: SimpleNamespace(slot=SimpleNamespace(is_angular=True), channel="w_m"),
+        gain=lambda *_given: 10.0,
+        at=lambda _gain: SimpleNamespace(weights={}),
+    )
+    asks: Any = InStep(None, following, None, (), None, None, 1, lambda _: None)  # type: ignore[arg-type]
+    weights, base, held = SimpleNamespace(left=lambda _held: 1.0), SimpleNamespace(vector=None), np.zeros(1)
+    return asks.found(weights, base, held)
+
+
 @pytest.mark.parametrize("locks", [0, 1, None])
 def test_the_free_run_is_tried_again_with_what_joined(monkeypatch: pytest.MonkeyPatch, locks: int | None):
     """``locks``: how many effects have to join before the free run does."""
@@ -96,21 +113,9 @@ def test_the_free_run_is_tried_again_with_what_joined(monkeypatch: pytest.Monkey
         tried.append(whole)
         return freed if locks is not None and whole is ways[locks] else None
 
-    monkeypatch.setattr(room, "leaves_structure", lambda *_given: True)
-    monkeypatch.setattr(room, "attribute", lambda *_given, **_more: object())
-    monkeypatch.setattr(InStep, "_order", lambda *_given: (12.0, 2.0 * SHARE))
-    monkeypatch.setattr(InStep, "_added", lambda *_given: None)
-    monkeypatch.setattr(InStep, "_whole", lambda *_given: ways[0])
     monkeypatch.setattr(InStep, "_further", lambda *_given: ways[1])
     monkeypatch.setattr(InStep, "_freed", let_free)
-    following = SimpleNamespace(
-        followed=lambda *_given: SimpleNamespace(slot=SimpleNamespace(is_angular=True), channel="w_m"),
-        gain=lambda *_given: 10.0,
-        at=lambda _gain: SimpleNamespace(weights={}),
-    )
-    asks: Any = InStep(None, following, None, (), None, None, 1, lambda _: None)  # type: ignore[arg-type]
-    weights, base, held = SimpleNamespace(left=lambda _held: 1.0), SimpleNamespace(vector=None), np.zeros(1)
-    made = asks.found(weights, base, held)
+    made = found_with(monkeypatch, ways[0], order=12.0)
     assert tried == ways[: 2 if locks is None else locks + 1]
     if locks is None:
         assert made.accepted == (), "the search goes on from the declared model"
@@ -121,19 +126,7 @@ def test_the_free_run_is_tried_again_with_what_joined(monkeypatch: pytest.Monkey
 def test_where_nothing_repeats_with_the_position_the_model_is_not_let_free(monkeypatch: pytest.MonkeyPatch):
     other = SimpleNamespace(candidate=candidates("windage")[0])
     whole = SimpleNamespace(accepted=(other,))
-    monkeypatch.setattr(room, "leaves_structure", lambda *_given: True)
-    monkeypatch.setattr(room, "attribute", lambda *_given, **_more: object())
-    monkeypatch.setattr(InStep, "_order", lambda *_given: (87.0, 2.0 * SHARE))
-    monkeypatch.setattr(InStep, "_added", lambda *_given: None)
-    monkeypatch.setattr(InStep, "_whole", lambda *_given: whole)
-    following = SimpleNamespace(
-        followed=lambda *_given: SimpleNamespace(slot=SimpleNamespace(is_angular=True), channel="w_m"),
-        gain=lambda *_given: 10.0,
-        at=lambda _gain: SimpleNamespace(weights={}),
-    )
-    asks: Any = InStep(None, following, None, (), None, None, 1, lambda _: None)  # type: ignore[arg-type]
-    weights, base, held = SimpleNamespace(left=lambda _held: 1.0), SimpleNamespace(vector=None), np.zeros(1)
-    made = asks.found(weights, base, held)
+    made = found_with(monkeypatch, whole, order=87.0)
     assert (made.accepted, made.rounds) == ((), ())
 
 

@@ -11,7 +11,8 @@ from itertools import zip_longest
 import numpy as np
 
 from thsa_cosim.diagnosis.choosing.gates import SIGMAS, insignificant, out_of_range
-from thsa_cosim.diagnosis.choosing.rounds import APART, Round, taken_over
+from thsa_cosim.diagnosis.choosing.needless import further_parts
+from thsa_cosim.diagnosis.choosing.rounds import APART, Round, number_of, taken_over
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns
 from thsa_cosim.diagnosis.choosing.selection import TIE_SHARE, Say
 from thsa_cosim.diagnosis.fitting.bench import Bench
@@ -42,14 +43,10 @@ def asked_again(bench: Bench, unknowns: Unknowns, model: Model, say: Say) -> Mod
     declared model.
     """
     for one in model.accepted[:-1]:
-        number = next(
-            k
-            for k, r in enumerate(model.rounds)
-            if r.accepted is not None and r.accepted.proposal is one.proposal
-        )
+        number = number_of(model.rounds, one)
         others = [s for s in model.accepted if s is not one]
         rivals = _near(model.rounds[number], one, others)
-        if not rivals or any(_is_part(s, one) for s in others):
+        if not rivals or further_parts(one.candidate, [s.candidate for s in others]):
             continue
         say(f"comparing {one.candidate.name} with its rivals again")
         found = [s for rival in rivals if (s := _in_place(bench, unknowns, model, one, rival)) is not None]
@@ -66,12 +63,6 @@ def _near(kept: Round, one: Scored, others: Sequence[Scored]) -> list[Scored]:
         if s.candidate.effect.name not in named:
             found.setdefault(s.candidate.name, s)
     return list(found.values())[:ASKED]
-
-
-def _is_part(part: Scored, one: Scored) -> bool:
-    """Whether ``part`` is a further one of the block of ``one``, without which it is nothing."""
-    a, b = part.candidate, one.candidate
-    return a.variant.beside and (a.variant.block, a.slot.name) == (b.variant.block, b.slot.name)
 
 
 def _in_place(bench: Bench, unknowns: Unknowns, model: Model, one: Scored, rival: Scored) -> Scored | None:

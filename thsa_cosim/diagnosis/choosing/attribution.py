@@ -16,7 +16,7 @@ from thsa_cosim.diagnosis.choosing.needless import further_parts, prune, within_
 from thsa_cosim.diagnosis.choosing.orders import NO_MACHINE, Machine
 from thsa_cosim.diagnosis.choosing.places import tied_places
 from thsa_cosim.diagnosis.choosing.ripples import first_free_orders, freed, on_orders
-from thsa_cosim.diagnosis.choosing.rounds import Round, taken_over
+from thsa_cosim.diagnosis.choosing.rounds import Round, number_of, taken_over
 from thsa_cosim.diagnosis.choosing.score import Scored
 from thsa_cosim.diagnosis.choosing.screen import Proposal, screen
 from thsa_cosim.diagnosis.choosing.selection import Say, Selection
@@ -77,7 +77,7 @@ class Attribution:
 
 def round_of(found: Attribution, scored: Scored) -> Round:
     """The round in which an accepted effect was accepted."""
-    return next(r for r in found.rounds if r.accepted is not None and r.accepted.proposal is scored.proposal)
+    return found.rounds[number_of(found.rounds, scored)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,11 +318,7 @@ def _with_places(
     """``rounds`` with the accepted effects at other shafts among their rivals, where those explain as much."""
     found = list(rounds)
     for scored in accepted:
-        k = next(
-            k
-            for k, r in enumerate(found)
-            if r.accepted is not None and r.accepted.proposal is scored.proposal
-        )
+        k = number_of(found, scored)
         named = {s.candidate.name for s in (*accepted, *found[k].rivals)}
         others = [c for c in candidates if c.name not in named]
         more = tied_places(bench, scored, current, held, others, machine)

@@ -59,6 +59,13 @@ class Round:
         return probability(gain, self.gains)
 
 
+def number_of(rounds: Sequence[Round], scored: Scored) -> int:
+    """Which of the ``rounds`` accepted an effect, from 0."""
+    return next(
+        k for k, r in enumerate(rounds) if r.accepted is not None and r.accepted.proposal is scored.proposal
+    )
+
+
 def taken_over(
     choice: Scored, scored: Sequence[Scored], objections: Sequence[str]
 ) -> tuple[list[Scored], tuple[str, ...]]:

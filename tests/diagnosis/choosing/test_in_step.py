@@ -155,10 +155,20 @@ def test_what_was_found_beside_a_ripple_is_judged_in_step_where_the_free_run_is_
     assert InStep._judged_in_step(asks, whole) is None
 
 
-@pytest.mark.parametrize(("share", "found"), [(SHARE, True), (0.9 * SHARE, False)])
+@pytest.mark.parametrize(
+    ("share", "before", "others", "found"),
+    [
+        (SHARE, 12.0, False, True),
+        (0.9 * SHARE, 12.0, False, False),
+        (SHARE, 13.0, False, True),
+        (SHARE, 2.0, False, False),
+        (SHARE, 2.0, True, True),
+    ],
+)
 def test_a_ripple_that_was_outweighed_joins_what_was_found_if_its_order_still_shows(
-    monkeypatch: pytest.MonkeyPatch, share: float, found: bool
+    monkeypatch: pytest.MonkeyPatch, share: float, before: float, others: bool, found: bool
 ):
+    """``before``: the order that showed in the beginning; an effect that was found since may have hidden the other."""
     offered = candidates("cogging")
     true = {"motorEffect.cogging.a_s": 0.25, "motorEffect.cogging.n": 12.0}
     own = bench(offered, true, 3, held_shapes(offered))
@@ -169,9 +179,14 @@ def test_a_ripple_that_was_outweighed_joins_what_was_found_if_its_order_still_sh
     asks: Any = InStep(own, None, unknowns(), offered, None, NO_MACHINE, 1, lambda _: None)  # type: ignore[arg-type]
     monkeypatch.setattr(InStep, "_order", lambda *_given: (12.0, share))
     followed: Any = SimpleNamespace(slot=offered[0].slot)
+    other = SimpleNamespace(candidate=candidates("windage")[0])
     so_far: Any = SimpleNamespace(
-        rounds=(), accepted=(), final=base, final_validate=held / own.factors("validate")
+        rounds=(),
+        accepted=(other,) if others else (),
+        final=base,
+        final_validate=held / own.factors("validate"),
     )
-    made = asks._whole(own, followed, 1.0, so_far)
-    assert [s.candidate.variant.beside for s in made.accepted] == ([False, True] if found else [])
-    assert all(s.candidate.effect.name == "cogging" for s in made.accepted)
+    made = asks._whole(own, followed, 1.0, so_far, before)
+    joined = [s for s in made.accepted if s is not other]
+    assert [s.candidate.variant.beside for s in joined] == ([False, True] if found else [])
+    assert all(s.candidate.effect.name == "cogging" for s in joined)

@@ -73,6 +73,7 @@ def test_the_best_of_many_candidates_gains_more_and_the_threshold_covers_it():
     assert limit == pytest.approx(exact, rel=0.15)
     assert probability(limit, gains) == pytest.approx(1e-3, rel=1e-6)
     assert probability(0.0, gains) > 0.99
+    assert (probability(-1e9, gains), probability(1e9, gains)) == (1.0, pytest.approx(0.0, abs=1e-300))
     assert probability(0.01 * limit, 0.01 * gains) == pytest.approx(1e-3, rel=1e-6), "in whatever unit"
     assert largest_gains(fit, [], seed=4).max() == 0.0
 

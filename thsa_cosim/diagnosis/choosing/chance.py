@@ -48,4 +48,4 @@ def probability(gain: float, gains: FloatArray) -> float:
     """Probability that chance makes at least ``gain``."""
     spread = max(float(np.std(gains, ddof=1)) * np.sqrt(6.0) / np.pi, 1e-9)
     location = float(np.mean(gains)) - _EULER * spread
-    return float(-np.expm1(-np.exp(-min((gain - location) / spread, 700.0))))
+    return float(-np.expm1(-np.exp(-np.clip((gain - location) / spread, -700.0, 700.0))))

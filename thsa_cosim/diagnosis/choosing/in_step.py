@@ -55,17 +55,14 @@ FURTHER = 0.03
 #: has to hit. Three simulated units ended beside the optimum there, at 1.4, 2.5 and 1.2 times the noise on held-out
 #: recordings, and at 1.04, 1.6 and 1.5 at this one. Set while looking at them.
 TOLERANCE = 1e-5
-#: What is said where the model was kept in step.
-NOTE = (
+_KEPT = (
     "effects were looked for with the model kept in step with a measured speed, since a ripple may make the machine"
-    " stick and slip; they were fitted to the free run from there"
+    " stick and slip; "
 )
-
-#: What is said where the free run with what was found in step falls out of step.
-LOST = (
-    "effects were looked for with the model kept in step with a measured speed, since a ripple may make the machine"
-    " stick and slip; the free run with them falls out of step with the machine, so they were judged in step"
-)
+#: What is said where the model was kept in step, ...
+NOTE = _KEPT + "they were fitted to the free run from there"
+#: ... and where the free run with what was found in step falls out of step.
+LOST = _KEPT + "the free run with them falls out of step with the machine, so they were judged in step"
 
 
 def _beside(fit: Fit, proposal: Proposal) -> Fit:

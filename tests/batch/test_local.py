@@ -351,7 +351,7 @@ def test_workers_that_cannot_start_are_an_error_with_a_reason(monkeypatch: pytes
 
 
 SCRIPT = """
-    import os, signal, sys, tempfile, time
+    import faulthandler, os, signal, sys, tempfile, time
     from pathlib import Path
     import numpy as np
     from thsa_cosim.batch import Experiment, Job, LocalRunner
@@ -367,6 +367,7 @@ SCRIPT = """
         with LocalRunner([experiment], workers=2) as runner:
             done = runner.run([Job("lag", {"u": 1.0})] * 4)
             print("started", done[0].status, float(done[0].reduced[0]), flush=True)
+            faulthandler.dump_traceback_later(25.0, exit=True)  # where it is, should it not end
             try:
                 runner.run([Job("lag", {"fault": float(fault)})] * 100)
             except KeyboardInterrupt:
@@ -392,6 +393,7 @@ def test_the_parent_may_be_interrupted_or_killed(tmp_path: Path, how: str, name:
         start_new_session=True,
     )
     assert process.stdout is not None
+    assert process.stderr is not None
     try:
         assert process.stdout.readline().startswith("started ok 0.999")
         time.sleep(0.3)
@@ -407,9 +409,10 @@ def test_the_parent_may_be_interrupted_or_killed(tmp_path: Path, how: str, name:
         process.kill()
         process.wait()
         process.stdout.close()
+        process.stderr.close()
     if how == "SIGINT":
-        assert output == "interrupted\n"
         assert errors == ""
+        assert output == "interrupted\n"
         assert process.returncode == 130
     else:
         assert process.returncode == -number

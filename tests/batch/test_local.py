@@ -392,24 +392,21 @@ def test_the_parent_may_be_interrupted_or_killed(tmp_path: Path, how: str, name:
         text=True,
         start_new_session=True,
     )
-    assert process.stdout is not None
-    assert process.stderr is not None
-    try:
-        assert process.stdout.readline().startswith("started ok 0.999")
-        time.sleep(0.3)
-        workers = _workers_of(folder)
-        assert len(workers) == 2
-        number = signal.Signals[how]
-        if how == "SIGINT":
-            for pid in workers:  # as a terminal would not, but a supervisor might
-                os.kill(pid, signal.SIGINT)
-        process.send_signal(number)
-        output, errors = process.communicate(timeout=30.0)
-    finally:
-        process.kill()
-        process.wait()
-        process.stdout.close()
-        process.stderr.close()
+    with process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline().startswith("started ok 0.999")
+            time.sleep(0.3)
+            workers = _workers_of(folder)
+            assert len(workers) == 2
+            number = signal.Signals[how]
+            if how == "SIGINT":
+                for pid in workers:  # as a terminal would not, but a supervisor might
+                    os.kill(pid, signal.SIGINT)
+            process.send_signal(number)
+            output, errors = process.communicate(timeout=30.0)
+        finally:
+            process.kill()
     if how == "SIGINT":
         assert errors == ""
         assert output == "interrupted\n"

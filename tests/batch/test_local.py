@@ -39,6 +39,15 @@ def printing_reducer(signals: Signals) -> FloatArray:
     return np.array([os.getpid()])
 
 
+def flooding_reducer(signals: Signals) -> FloatArray:
+    """Print 2 MiB, and wait until the runner has emptied the console."""
+    print(f"flood of {os.getpid()}\n" + "." * 2**21, flush=True)
+    until = time.monotonic() + 10.0
+    while os.fstat(1).st_size > 2**20 and time.monotonic() < until:
+        time.sleep(0.01)
+    return signals["y"][-1:]
+
+
 def halves_in_single(signals: Signals) -> np.ndarray:
     return np.full(40, 0.5, dtype=np.float32)
 
@@ -291,6 +300,25 @@ def test_workers_are_recycled_by_count_and_by_memory() -> None:
         # Each of these leaks 4 MiB in each of its last 10 steps.
         leaking = runner.run([fault("leak", at=0.9)] * 8)
         assert len({float(o.reduced[0]) for o in leaking if o.reduced is not None}) in (2, 3, 4)
+
+
+def test_a_flood_is_told_of_the_run_that_printed_it(tmp_path: Path) -> None:
+    """The runner sees the flood of a run before it has read the answers of those before it."""
+
+    def read_late(index: int, _: Outcome) -> None:
+        until = time.monotonic() + 10.0
+        while index == 0 and time.monotonic() < until:
+            if any(file.stat().st_size > 2**20 for file in tmp_path.rglob("console")):
+                time.sleep(0.1)  # more than a tick: the runner looks before it reads the next answer
+                return
+            time.sleep(0.01)
+
+    flooding = experiment("flooding", reduce=flooding_reducer)
+    with LocalRunner([experiment(), flooding], workers=1, backend="python") as runner:
+        runner.run([Job("lag")] * 40)  # short runs: the worker is given some ahead
+        outcomes = runner.run([Job("lag")] * 3 + [Job("flooding"), Job("lag")], read_late)
+    assert [o.status for o in outcomes] == [Status.OK] * 5
+    assert [o.console[:9] for o in outcomes] == ["", "", "", "flood of ", ""]
 
 
 def test_memory_limit_lets_others_pass() -> None:

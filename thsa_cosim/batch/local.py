@@ -272,13 +272,8 @@ class LocalRunner(Closing):
         worker.since, worker.silent_ticks = at, 0
         worker.runs += 1
         worker.is_leaving |= done.leaves
-        outcome = done.outcome
+        outcome = replace(done.outcome, console=worker.whole_console(done.serial, done.outcome.console))
         self._typical_s = max(0.8 * self._typical_s + 0.2 * outcome.duration_s, 1e-6)
-        if worker.console_head:
-            outcome = replace(
-                outcome, console=(worker.console_head + outcome.console)[: worker.console_limit]
-            )
-            worker.console_head = ""
         trouble = None if outcome.ok else self._study.trouble()
         fault = fault_of(outcome, trouble)
         if (index := batch.index.pop(done.serial)) in batch.refused:

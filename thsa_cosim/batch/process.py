@@ -79,8 +79,9 @@ class WorkerProcess:
         """What ``reap`` found."""
         self.last_words: list[Event] = []
         """What had arrived, or was on its way, when the process was reaped."""
-        self.console_head = ""
-        self.console_limit = setup.console_limit
+        self._heads: dict[int, str] = {}
+        """How the console of a job began that prints so much that the file was emptied, by the job's serial."""
+        self._console_limit = setup.console_limit
         (folder / "cwd").mkdir(parents=True)
         self._progress_path = folder / "progress"
         self._progress_path.write_bytes(bytes(8 * PROGRESS_SLOTS))
@@ -166,8 +167,12 @@ class WorkerProcess:
 
     def console(self) -> str:
         """Return what the worker printed since its last finished run, cut."""
-        text = read_console(self.folder, self.console_limit)
-        return (self.console_head + text)[: self.console_limit + 64]
+        return self.whole_console(self.progress().serial, read_console(self.folder, self._console_limit))
+
+    def whole_console(self, serial: int, rest: str) -> str:
+        """Return what a job printed, cut: before the file was emptied, and the ``rest`` since then."""
+        head = self._heads.pop(serial, "")
+        return (head + rest)[: self._console_limit] if head else rest
 
     def watch(self) -> int:
         """Stop floods of output; return by how many resident bytes the worker has grown."""
@@ -175,9 +180,11 @@ class WorkerProcess:
         console = self.folder / "console"
         with contextlib.suppress(OSError):
             if console.stat().st_size > _FLOOD:
-                if not self.console_head:
-                    self.console_head = read_console(self.folder, self.console_limit)
+                serial = self.progress().serial  # ``assigned`` lags: a predecessor's answer may be on its way
+                head = read_console(self.folder, self._console_limit)
                 os.truncate(console, 0)
+                if self.progress().serial == serial:
+                    self._heads.setdefault(serial, head)
         return resident_bytes(self.pid) - self.idle_rss if self.idle_rss else 0
 
     def reap(self) -> int:

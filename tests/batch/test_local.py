@@ -40,11 +40,12 @@ def printing_reducer(signals: Signals) -> FloatArray:
 
 
 def flooding_reducer(signals: Signals) -> FloatArray:
-    """Print 2 MiB, and wait until the runner has emptied the console."""
+    """Print 2 MiB, wait until the runner has emptied the console, and print 16 KiB."""
     print(f"flood of {os.getpid()}\n" + "." * 2**21, flush=True)
     until = time.monotonic() + 10.0
     while os.fstat(1).st_size > 2**20 and time.monotonic() < until:
         time.sleep(0.01)
+    print("." * 2**14, flush=True)
     return signals["y"][-1:]
 
 
@@ -319,6 +320,8 @@ def test_a_flood_is_told_of_the_run_that_printed_it(tmp_path: Path) -> None:
         outcomes = runner.run([Job("lag")] * 3 + [Job("flooding"), Job("lag")], read_late)
     assert [o.status for o in outcomes] == [Status.OK] * 5
     assert [o.console[:9] for o in outcomes] == ["", "", "", "flood of ", ""]
+    # What came before and after the file was emptied is cut as one text, and says so.
+    assert outcomes[3].console[8191:] == ".\n... (cut)"
 
 
 def test_memory_limit_lets_others_pass() -> None:

@@ -161,6 +161,7 @@ def test_it_finds_the_effect_and_writes_a_model_that_predicts_to_the_noise(tmp_p
     assert before["i_q"]["rmse"] > 1.1 * before["i_q"]["noise"]
     for channel, error in after.items():
         assert error["rmse"] < 1.05 * error["noise"], channel
+    assert not any("standard errors are those" in note for note in result["notes"])
 
     # The class alone gives the model again, with the values that were found.
     again = export_fmu(

@@ -9,7 +9,7 @@ from report_studies import diagnose_result
 
 from thsa_cosim.diagnosis.conclusion import export_command
 from thsa_cosim.report.diagnose.evidence import evidence
-from thsa_cosim.report.diagnose.verdict import verdict
+from thsa_cosim.report.diagnose.verdict import before_after, verdict
 from thsa_cosim.report.folder import Part
 from thsa_cosim.report.parts.content import Table
 
@@ -64,6 +64,28 @@ def test_what_the_data_do_not_determine_is_in_brackets_with_its_reason() -> None
     values = {row[2].text: row[3].text for row in table.rows}
     assert values == {"gap": "(2.50 ± 0.10)e-4", "s_0": "((0.0 ± 6.0)e-5)"}
     assert table.note == "In brackets: not determined by these data: s_0, it ended at 0."
+
+
+@pytest.mark.parametrize(
+    ("word", "added", "doubted"),
+    [
+        ("missing-effect", False, False),
+        ("no-missing-effect", False, False),
+        ("unexplained-structure", False, True),
+        ("unexplained-structure", True, False),  # a law that joined the model explains it
+    ],
+)
+def test_standard_errors_beside_a_residual_that_is_left_are_doubted(
+    tmp_path: Path, word: str, added: bool, doubted: bool
+) -> None:
+    result = diagnose_result() | {"verdict": word}
+    result["empirical"]["added"] = added
+    section = before_after(Part("", "diagnose", tmp_path, result, {}, None))
+    assert section is not None
+    tables = [b for b in (*verdict(result), *section.blocks) if isinstance(b, Table)]
+    notes = [t.note for t in tables if "± one standard error" in t.caption]
+    assert len(notes) == 2  # of the effects' parameters and of the declared ones
+    assert all(("values may be off by more" in note) is doubted for note in notes)
 
 
 def test_a_command_to_copy_survives_a_space_in_a_path() -> None:

@@ -30,6 +30,7 @@ def test_the_servo_loses_a_share_of_its_load(tmp_path: Path) -> None:
     assert values["R"] == pytest.approx(2.81, rel=0.15)
     assert ratio(found, "q") < 0.6
     assert found["verdict"] == "unexplained-structure"
+    assert any("times the noise in q on held-out recordings: the standard" in note for note in found["notes"])
 
 
 @pytest.mark.nightly

@@ -272,7 +272,9 @@ class LocalRunner(Closing):
         worker.since, worker.silent_ticks = at, 0
         worker.runs += 1
         worker.is_leaving |= done.leaves
-        outcome = replace(done.outcome, console=worker.whole_console(done.serial, done.outcome.console))
+        outcome = done.outcome
+        if (console := worker.whole_console(done.serial, outcome.console)) != outcome.console:
+            outcome = replace(outcome, console=console)
         self._typical_s = max(0.8 * self._typical_s + 0.2 * outcome.duration_s, 1e-6)
         trouble = None if outcome.ok else self._study.trouble()
         fault = fault_of(outcome, trouble)

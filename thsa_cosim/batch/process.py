@@ -172,7 +172,10 @@ class WorkerProcess:
     def whole_console(self, serial: int, rest: str) -> str:
         """Return what a job printed, cut: before the file was emptied, and the ``rest`` since then."""
         head = self._heads.pop(serial, "")
-        return (head + rest)[: self._console_limit] if head else rest
+        if not head:
+            return rest
+        whole = head + rest
+        return whole[: self._console_limit] + ("\n... (cut)" if len(whole) > self._console_limit else "")
 
     def watch(self) -> int:
         """Stop floods of output; return by how many resident bytes the worker has grown."""

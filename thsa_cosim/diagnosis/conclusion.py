@@ -28,7 +28,7 @@ from thsa_cosim.diagnosis.choosing.hidden import hidden_parts, notes_on_hidden, 
 from thsa_cosim.diagnosis.choosing.orders import Machine
 from thsa_cosim.diagnosis.choosing.score import Scored, extended_unknowns, fixed_shapes
 from thsa_cosim.diagnosis.choosing.spread import between_models
-from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
+from thsa_cosim.diagnosis.choosing.verdict import left_over, note_on_standard_errors, verdict_on
 from thsa_cosim.diagnosis.explaining.balance import close_balances
 from thsa_cosim.diagnosis.explaining.dependence import dependence
 from thsa_cosim.diagnosis.explaining.empirical import FoundLaw, LawSearch, law_of
@@ -296,6 +296,10 @@ class Conclusion:
         if not _tested(found):
             yield _untested(found, self.effects)
         yield from off_the_drawing(extended.identified.fit)
+        held_out = tuple(t for t in self.trials if t.part == "validate")
+        left = errors(held_out, extended.identified.validate)
+        if said := note_on_standard_errors(left, len(found.accepted)):
+            yield said
         if extended.model is not None and extended.fmu is not None:
             again = export_command(extended.model, self.spec.package, extended.fmu)
             yield f"{extended.fmu.name} is for {native_platform().fmi3} only; {again} compiles it for all platforms"

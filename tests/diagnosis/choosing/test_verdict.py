@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thsa_cosim.diagnosis.choosing.verdict import left_over, verdict_on
+from thsa_cosim.diagnosis.choosing.verdict import left_over, note_on_standard_errors, verdict_on
 from thsa_cosim.diagnosis.results import StructuredError
 
 
@@ -37,6 +37,20 @@ def test_verdict(name: str):
     shown = error(2.0, 2.0 * structure, significance)
     assert verdict_on({"v": NOTHING, "i": shown}, accepted, tested) == expected
     assert verdict_on({"i": shown, "v": NOTHING}, accepted, tested) == expected
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_standard_errors_are_doubted_where_something_is_left(name: str):
+    structure, significance, accepted, _, expected = CASES[name]
+    shown = error(2.0, 2.0 * structure, significance, rmse=2.56)
+    for found in ({"v": error(4.0, 0.2, 2.0), "i": shown}, {"i": shown, "v": error(4.0, 0.2, 2.0)}):
+        note = note_on_standard_errors(found, accepted)
+        if expected == "unexplained-structure" or (expected == "not-tested" and structure > 1.0):
+            assert note.startswith(
+                "the model leaves 1.28 times the noise in i on held-out recordings: the standard"
+            )
+        else:
+            assert note == ""
 
 
 def test_a_gross_error_is_no_noise_even_where_few_samples_make_it():

@@ -39,13 +39,18 @@ def largest_gains(base: Fit, proposals: Sequence[Proposal], seed: int, draws: in
 
 
 def threshold(gains: FloatArray, chance: float = 1e-3) -> float:
-    """Gain that chance exceeds with probability ``chance``: Gumbel's law through the draws' mean and deviation."""
-    spread = float(np.std(gains, ddof=1)) * np.sqrt(6.0) / np.pi
-    return float(np.mean(gains) - _EULER * spread - spread * np.log(-np.log1p(-chance)))
+    """Gain that chance exceeds with probability ``chance``."""
+    location, spread = _gumbel(gains)
+    return float(location - spread * np.log(-np.log1p(-chance)))
 
 
 def probability(gain: float, gains: FloatArray) -> float:
     """Probability that chance makes at least ``gain``."""
-    spread = max(float(np.std(gains, ddof=1)) * np.sqrt(6.0) / np.pi, 1e-9)
-    location = float(np.mean(gains)) - _EULER * spread
-    return float(-np.expm1(-np.exp(-np.clip((gain - location) / spread, -700.0, 700.0))))
+    location, spread = _gumbel(gains)
+    return float(-np.expm1(-np.exp(-np.clip((gain - location) / max(spread, 1e-9), -700.0, 700.0))))
+
+
+def _gumbel(gains: FloatArray) -> tuple[float, float]:
+    """Location and spread of Gumbel's law with the mean and the deviation of ``gains``."""
+    spread = float(np.std(gains, ddof=1)) * float(np.sqrt(6.0)) / float(np.pi)
+    return float(np.mean(gains)) - _EULER * spread, spread

@@ -34,7 +34,7 @@ from thsa_cosim.signals import FloatArray
 SHARE = 0.18
 #: Two orders that are less apart are the same one. A simulated resolver's eccentricity showed order 2 and then 107; a
 #: cogging stayed within 1 in all of 19 simulated units. Set while looking at them.
-SAME = 1.5
+NEAR = 1.5
 #: The order is looked for with so much of the gain: a looser model shows less of the noise of what it follows. Of two
 #: simulated units with cogging the share rose from 0.13 to 0.22 and from 0.41 to 0.54, of four others it stayed below
 #: 0.08. Set while looking at them.
@@ -269,7 +269,7 @@ class InStep:
         held = found.final_validate * stepped.factors("validate")
         order, share = self._order(followed, gain, fit)
         # Without a ripple so far, what showed its order may have been another effect that is in the model now.
-        still = share >= SHARE and (bool(accepted) or abs(order - before) < SAME)
+        still = share >= SHARE and (bool(accepted) or abs(order - before) < NEAR)
         shows = still or any(_is_ripple(s.candidate) for s in accepted)
         for harmonic in (False, True) if shows else ():
             made = self._added(stepped, followed, (order,), fit, held, harmonic)

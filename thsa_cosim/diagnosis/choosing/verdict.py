@@ -32,6 +32,20 @@ def verdict_on(errors_after: Mapping[str, StructuredError], accepted: int, teste
     return "no-missing-effect" if tested else "not-tested"
 
 
+def note_on_standard_errors(errors_after: Mapping[str, StructuredError], accepted: int) -> str:
+    """A doubt about the standard errors of a model that leaves held-out ``errors_after``; "" where nothing is left.
+
+    They hold what noise makes of the values, and correlated residuals, but not what the model lacks.
+    """
+    if verdict_on(errors_after, accepted, tested=1) != "unexplained-structure":
+        return ""
+    ratio, channel = max((e.rmse / e.noise, name) for name, e in errors_after.items())
+    return (
+        f"the model leaves {ratio:.3g} times the noise in {channel} on held-out recordings: the standard errors are"
+        " those of a model that lacks nothing, and values may be off by more"
+    )
+
+
 def is_visible(found: Mapping[str, StructuredError], size: float) -> bool:
     """Whether some signal holds structure that is neither chance nor smaller than ``size`` (in its noise)."""
     return any(e.structure > size * e.noise and e.significance > SIGNIFICANT for e in found.values())

@@ -27,6 +27,7 @@ _VERDICTS = {
     " structure shows what it depends on.",
     "not-tested": "No effect could be tried on this model and these recordings.",
 }
+_DOUBT = "A residual is left: standard errors are those of a model that lacks nothing, and values may be off by more."
 
 
 def verdict(result: Json) -> tuple[Block, ...]:
@@ -39,7 +40,7 @@ def verdict(result: Json) -> tuple[Block, ...]:
         sentence = f"The model lacks {names}. In addition, a" + sentence[1:]
     blocks: list[Block] = [Text(sentence, "lead good" if word == "no-missing-effect" else "lead bad")]
     if effects:
-        blocks.append(_effects_table(effects))
+        blocks.append(_effects_table(effects, _doubt(result)))
     facts = []
     if result.get("unexplained") is not None:
         facts.append(
@@ -133,7 +134,7 @@ def before_after(part: Part) -> Section | None:
     blocks: list[Block] = [_ratios_figure(part, rows), _errors_table(rows, signal_units(part.folder))]
     declared: Json = result.get("parameters") or {}
     if declared.get("before"):
-        blocks.append(_declared_table(declared["before"], declared.get("after") or {}))
+        blocks.append(_declared_table(declared["before"], declared.get("after") or {}, _doubt(result)))
     return Section(f"{part.prefix}before-after", "Before and after", tuple(blocks))
 
 
@@ -169,7 +170,7 @@ def _errors_table(rows: list[_Pair], units: Json) -> Table:
     return Table("Errors before and after", columns, table, note)
 
 
-def _declared_table(before: Json, after: Json) -> Table:
+def _declared_table(before: Json, after: Json, doubt: str) -> Table:
     columns = [Column("declared parameter", numeric=False), Column("unit", numeric=False)]
     columns += [Column("before"), Column("after")]
     rows = []
@@ -177,7 +178,15 @@ def _declared_table(before: Json, after: Json) -> Table:
         own = [value, after.get(name) or {}]
         cells = [Cell(plus_minus(v.get("value"), v.get("stderr")), v.get("value")) for v in own]
         rows.append((text_cell(name), text_cell(value.get("unit", "")), *cells))
-    return Table("Declared parameters of each model, re-identified, ± one standard error", columns, rows)
+    return Table(
+        "Declared parameters of each model, re-identified, ± one standard error", columns, rows, doubt
+    )
+
+
+def _doubt(result: Json) -> str:
+    """What standard errors do not hold, where the last model leaves something; else empty."""
+    law: Json = result.get("empirical") or {}
+    return _DOUBT if result.get("verdict") == "unexplained-structure" and not law.get("added") else ""
 
 
 def recordings(part: Part) -> Section | None:
@@ -218,7 +227,7 @@ def candidates(part: Part) -> Section | None:
     return Section(f"{part.prefix}candidates", "Effects that were weighed", tuple(blocks)) if blocks else None
 
 
-def _effects_table(effects: list[Json]) -> Table:
+def _effects_table(effects: list[Json], doubt: str) -> Table:
     columns = [Column("effect", numeric=False), Column("probability"), Column("parameter", numeric=False)]
     columns += [
         Column("value"),
@@ -238,7 +247,8 @@ def _effects_table(effects: list[Json]) -> Table:
                 reasons.append(f"{name}, {value['reason']}" if value.get("reason") else name)
             own = (text_cell(name), Cell(text, value["value"], mark), text_cell(value.get("unit", "")))
             rows.append((*named, *own, text_cell(alike)))
-    note = f"In brackets: not determined by these data: {'; '.join(reasons)}." if reasons else ""
+    brackets = f"In brackets: not determined by these data: {'; '.join(reasons)}." if reasons else ""
+    note = " ".join(filter(None, (brackets, doubt)))
     return Table("Result: effects with their parameters ± one standard error", columns, rows, note)
 
 

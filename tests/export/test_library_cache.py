@@ -2,6 +2,10 @@
 
 import ctypes
 import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -106,3 +110,76 @@ def test_without_ziglang_the_machines_compiler_builds_for_this_machine_alone(
     other = next(platform for platform in PLATFORMS if platform != own)
     with pytest.raises(MissingExtraError, match=rf"for {other.fmi3} needs an optional part.*\[export\]"):
         compile_library(folder, ["model.c"], other, library)
+
+
+def together(folders: list[Path], tmp_path: Path) -> None:
+    """Compile the model of each folder, all at once."""
+    with ThreadPoolExecutor(len(folders)) as pool:
+        begun = [
+            pool.submit(compile_library, folder, ["model.c"], PLATFORMS[0], tmp_path / f"{folder.name}.so")
+            for folder in folders
+        ]
+        for one in begun:
+            one.result()
+
+
+def test_zig_runs_one_at_a_time(
+    compiler: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two that share a cache may deadlock (ziglang/zig, issue 22453)."""
+    monkeypatch.setenv("ZIG_GLOBAL_CACHE_DIR", str(tmp_path / "zig"))
+    busy, most, run = threading.Semaphore(1), [], compiling.subprocess.run
+
+    def slow(*args: object, **options: object) -> object:
+        most.append(busy.acquire(blocking=False))
+        time.sleep(0.1)
+        busy.release()
+        return run(*args, **options)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(compiling.subprocess, "run", slow)
+    together([sources(tmp_path / str(n), model_c=f"int a{n};") for n in range(3)], tmp_path)
+    assert most == [True] * 3
+    together([sources(tmp_path / f"same{n}", model_c="int same;") for n in range(3)], tmp_path)
+    assert len(compiler) == 4  # who waited takes what the first one has kept
+    assert (tmp_path / "same2.so").read_bytes() == b"int same;"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs flock")
+def test_zig_waits_for_that_of_another_process(
+    compiler: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ZIG_GLOBAL_CACHE_DIR", str(tmp_path / "zig"))
+    script = (
+        "import sys; from thsa_cosim.fmu.zig import one_at_a_time\n"
+        "with one_at_a_time(['ziglang']): print('holds', flush=True); sys.stdin.read()"
+    )
+    holder = subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    with holder, ThreadPoolExecutor(1) as pool:
+        assert holder.stdin is not None
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == b"holds\n"
+        folder = sources(tmp_path / "model", model_c="int a;")
+        begun = pool.submit(compile_library, folder, ["model.c"], PLATFORMS[0], tmp_path / "model.so")
+        time.sleep(0.2)
+        assert compiler == []
+        holder.stdin.close()
+        begun.result(timeout=10.0)
+    assert len(compiler) == 1
+
+
+def test_the_machines_own_compiler_waits_for_nobody(
+    compiler: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiling, "ziglang_version", lambda: None)
+    monkeypatch.setattr(compiling, "native_platform", lambda: PLATFORMS[0])
+    monkeypatch.setattr(compiling, "host_compiler", lambda: "cc")
+    monkeypatch.setattr(compiling, "_version", lambda _: "1.0")
+    both, run = threading.Barrier(2), compiling.subprocess.run
+
+    def met(*args: object, **options: object) -> object:
+        both.wait(timeout=10.0)
+        return run(*args, **options)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(compiling.subprocess, "run", met)
+    together([sources(tmp_path / str(n), model_c=f"int a{n};") for n in range(2)], tmp_path)
+    assert len(compiler) == 2

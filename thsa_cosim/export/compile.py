@@ -21,6 +21,7 @@ from platform import machine as machine_name
 from thsa_cosim.errors import MissingExtraError, ThsaCosimError
 from thsa_cosim.export.cache import cache_folder, keep
 from thsa_cosim.fmu.sources import host_compiler
+from thsa_cosim.fmu.zig import one_at_a_time
 
 
 @dataclass(frozen=True)
@@ -79,14 +80,16 @@ def compile_library(folder: Path, sources: Sequence[str], platform: Platform, ou
     if platform.suffix == ".so":
         command.append("-lm")
     kept = _kept(folder, [version, platform.target, *flags, *sources], platform.suffix)
-    if kept is not None and kept.is_file():
-        with contextlib.suppress(OSError):
-            shutil.copyfile(kept, output)
-            kept.touch()
+    if _was_kept(kept, output):
+        return
+    with one_at_a_time(command):
+        if _was_kept(kept, output):  # compiled meanwhile
             return
-    done = subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, env={**os.environ, "ZIG_PROGRESS": "0"}
-    )
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, env={**os.environ, "ZIG_PROGRESS": "0"}
+        )
+        if not done.returncode and kept is not None:
+            keep(output, kept, KEPT)
     if done.returncode:
         lines = (
             [line for line in done.stderr.splitlines() if "error" in line]
@@ -94,8 +97,16 @@ def compile_library(folder: Path, sources: Sequence[str], platform: Platform, ou
             or ["no message"]
         )
         raise ThsaCosimError(f"The C compiler failed for {platform.target}: {lines[0]}")
-    if kept is not None:
-        keep(output, kept, KEPT)
+
+
+def _was_kept(kept: Path | None, output: Path) -> bool:
+    """Whether a kept library was copied to ``output``."""
+    if kept is not None and kept.is_file():
+        with contextlib.suppress(OSError):
+            shutil.copyfile(kept, output)
+            kept.touch()
+            return True
+    return False
 
 
 def _kept(folder: Path, options: Sequence[str], suffix: str) -> Path | None:

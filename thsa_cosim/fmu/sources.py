@@ -14,6 +14,7 @@ from thsa_cosim.errors import FmuError
 from thsa_cosim.fmu.archive import unpack
 from thsa_cosim.fmu.description import read_description
 from thsa_cosim.fmu.native import LIBRARY_SUFFIX, platform_folders
+from thsa_cosim.fmu.zig import one_at_a_time
 
 _TIMEOUT_S = 600.0
 _NO_PREFIX = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX", "-DDISABLE_PREFIX")
@@ -66,9 +67,11 @@ def compile_sources(path: Path, target: Path) -> Path:
 
 
 def _build(path: Path, options: list[str], files: list[str], folder: Path) -> None:
-    done = subprocess.run(
-        [*options, *files], cwd=folder, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False
-    )
+    command = [*options, *files]
+    with one_at_a_time(command):
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False
+        )
     if done.returncode:
         lines = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines()
         raise FmuError(

@@ -123,6 +123,7 @@ def together(folders: list[Path], tmp_path: Path) -> None:
             one.result()
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="needs flock")
 def test_zig_runs_one_at_a_time(
     compiler: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -121,6 +121,8 @@ class Conclusion:
             instead = self._instead()
         after = extended.identified
         changed = after is not before
+        errors_before = _errors(before)
+        errors_after = _errors(after) if changed else errors_before
         between = between_models(found, after.fit, self.bench.of("fit"))
         hidden = hidden_parts(found)
         sure_before, sure_after = _sure(before), np.hypot(_sure(after), between)
@@ -140,8 +142,8 @@ class Conclusion:
             verdict=verdict,
             effects=found_effects(found, after.fit, self.machine, sure_after),
             known=known_values(self.known, after.fit, sure_after),
-            before=_errors(before),
-            after=_errors(after) if changed else {"fit": {}, "validate": {}},
+            before=errors_before,
+            after=errors_after if changed else {"fit": {}, "validate": {}},
             recordings_before=_errors_by_recording(before),
             recordings_after=_errors_by_recording(after) if changed else {},
             declared_before=values_of(before.fit, declared=True, stderr=sure_before),
@@ -171,7 +173,7 @@ class Conclusion:
             threshold=found.rounds[0].threshold if found.rounds else 0.0,
             evaluations=self.bench.evaluations + before.evaluations + (after.evaluations if changed else 0),
             failures=_failures(self.bench, *([before, after] if changed else [before])),
-            notes=(*self._notes(extended, found), *told, *([said] if said else [])),
+            notes=(*self._notes(extended, found, errors_after["validate"]), *told, *([said] if said else [])),
             data=with_slips(scenario.data, after, scenario.file_units),
             asked=scenario.table.model_dump(mode="json", by_alias=True, exclude_unset=True),
             coupling=coupled if isinstance(coupled, CouplingError) else None,
@@ -285,8 +287,10 @@ class Conclusion:
             fmu, trials, unknowns, starts, self.scenario.simulation, self.study.open_runner, near
         )
 
-    def _notes(self, extended: _Model, found: Attribution) -> Iterator[str]:
-        """What a reader of the result should know: sentences."""
+    def _notes(
+        self, extended: _Model, found: Attribution, left: Mapping[str, StructuredError]
+    ) -> Iterator[str]:
+        """What a reader of the result should know, whose model has ``left`` held-out errors: sentences."""
         yield from self.bench.notes
         yield from note_on_means(self.trials)
         yield from found.notes
@@ -296,8 +300,6 @@ class Conclusion:
         if not _tested(found):
             yield _untested(found, self.effects)
         yield from off_the_drawing(extended.identified.fit)
-        held_out = tuple(t for t in self.trials if t.part == "validate")
-        left = errors(held_out, extended.identified.validate)
         if said := note_on_standard_errors(left, len(found.accepted)):
             yield said
         if extended.model is not None and extended.fmu is not None:

@@ -119,11 +119,17 @@ def _noises(recordings: Sequence[Recording], inputs: Collection[str]) -> Iterato
         least = _ROUNDING * max(
             (float(np.max(np.abs(r.signals[name]))) for r in recordings if name in r.signals), default=0.0
         )
-        noises = {r.name: r.noise[name] for r in recordings if r.noise.get(name, 0.0) > least}
+        noises = [
+            (r, r.noise[name]) for r in recordings if name in r.samples and r.noise.get(name, 0.0) > least
+        ]
         if len(noises) < 2:
             continue
-        usual = float(np.median(list(noises.values())))
-        for recording, noise in noises.items():
+        usual = float(np.median([noise for _, noise in noises]))
+        for recording, noise in noises:
             if not usual / _APART < noise < usual * _APART:
-                text = f"the noise of {name} is {noise:.3g} here and {usual:.3g} in the recordings together"
-                yield Finding(recording, name, "unequal-noise", "warning", text)
+                channel = _channel(recording, name, driven=False)
+                text = (
+                    f"the noise of {name} is {channel.number(noise)} here and"
+                    f" {channel.number(usual)} in the recordings together"
+                )
+                yield channel.finding("unequal-noise", "warning", text)

@@ -74,7 +74,12 @@ def build(model: str, fmi: int = 2, flags: tuple[str, ...] = ("-O2",), extra: tu
     """Compile one model into a shared library (or, with `extra` sources, a program)."""
     out = Path(_folder.name) / f"{model}_{fmi}_{abs(hash((flags, extra)))}.so"
     shared = [] if extra else ["-shared", "-fPIC", "-fvisibility=hidden"]
-    sources = [*extra, *(RUNTIME / name for name in (f"fmi{fmi}.c", *COMMON)), HERE / model / "model.c"]
+    sources = [
+        *extra,
+        *(RUNTIME / name for name in (f"fmi{fmi}.c", *COMMON)),
+        HERE / model / "model.c",
+        HERE / "guid.c",
+    ]
     include = [f"-isystem{HEADERS}", *(f"-I{folder}" for folder in (HERE, HERE / model, RUNTIME))]
     warn = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"]
     command = [*compiler(), *warn, *flags, *shared, *include, "-o", out, *sources, "-lm", "-lpthread"]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import gmtime, strftime
 
-from thsa_cosim.export.codegen import config_header, identifier, model_source
+from thsa_cosim.export.codegen import config_header, identifier, model_source, start_source
 from thsa_cosim.export.compile import PLATFORMS, Platform, compile_library
 from thsa_cosim.export.description import build_description, fmi2_description, fmi3_description
 from thsa_cosim.export.model import CausalModel
@@ -36,9 +36,10 @@ def make_sources(model: CausalModel, fmi: int) -> Sources:
     """The C sources of a model for FMI version 2 or 3. The token (guid) follows from the digest."""
     import fmpy
 
-    name = identifier(model.flat.name)
+    name, tolerance = identifier(model.flat.name), model.flat.experiment.tolerance
     source = model_source(model)
-    files = {"model.c": source.text.encode()}
+    config = config_header(model, name, tolerance, source.cache).encode()
+    files = {"model.c": source.text.encode(), "model_start.c": start_source(model, "").encode()}
     other = "fmi3" if fmi == 2 else "fmi2"
     for path in sorted(RUNTIME.glob("*.[ch]")):
         if not path.name.startswith(other):
@@ -46,17 +47,16 @@ def make_sources(model: CausalModel, fmi: int) -> Sources:
     headers = Path(fmpy.__file__).parent / "c-code"
     files |= {header: (headers / header).read_bytes() for header in _HEADERS[fmi]}
     describe = fmi2_description if fmi == 2 else fmi3_description
-    tolerance = model.flat.experiment.tolerance
     digest = hashlib.sha256()
     compiled = tuple(sorted(file for file in files if file.endswith(".c")))
     described = (model, name, "", "") if fmi == 3 else (model, name, "", "", compiled)
-    for text in (describe(*described), config_header(model, name, "", tolerance, source.cache).encode()):
+    for text in (describe(*described), config):
         digest.update(text)
     for file in sorted(files):
         digest.update(file.encode() + b"\0" + files[file].replace(b"\r\n", b"\n") + b"\0")
     code = digest.hexdigest()
     token = f"{{{code[:8]}-{code[8:12]}-{code[12:16]}-{code[16:20]}-{code[20:32]}}}"
-    files["model_config.h"] = config_header(model, name, token, tolerance, source.cache).encode()
+    files |= {"model_config.h": config, "model_start.c": start_source(model, token).encode()}
     return Sources(files, compiled, code, token, name)
 
 

@@ -26,9 +26,9 @@ from thsa_cosim.system.order import stages
 from thsa_cosim.system.structure import Component, System
 
 IDENTIFIER = "System"
-_OWN = ("model.c", "model_config.h")
+_OWN = ("model.c", "model_start.c", "model_config.h")
 _DISCRETE = ("N_EVENTS", "N_Z", "N_T", "N_R", "N_A", "N_IMPLICIT")
-_FORMAT = "1"
+_FORMAT = "2"
 """Goes into the digest: raise it when the generated code changes."""
 
 
@@ -81,8 +81,10 @@ def _sources(component: Component, archive: bytes) -> tuple[dict[str, bytes], ET
             if re.fullmatch(r"sources/[\w.]+\.[ch]", name)
         }
         document = ET.fromstring(file.read("modelDescription.xml"))
-    if not all(name in files for name in _OWN):
+    if "model.c" not in files:
         raise NotMergeable(f"{component.name} carries no sources")
+    if not all(name in files for name in _OWN):
+        raise NotMergeable(f"{component.name} was exported by an earlier version")
     return files, document
 
 
@@ -92,7 +94,7 @@ def _member(component: Component, own: Mapping[str, bytes], document: ET.Element
     used = [name for name in _DISCRETE if config.get(name)]
     if used:
         raise NotMergeable(f"{component.name} has discrete parts or implicit equations")
-    model = own["model.c"].decode()
+    model = own["model.c"].decode() + own["model_start.c"].decode()
     for name in ("outputs", "rhs"):
         body = model.split(f"int model_{name}(", 1)[1].split("\n}\n", 1)[0]
         if re.search(r"\bt\b", body.split("{", 1)[1].replace("(void)t", "")):
@@ -145,7 +147,7 @@ def _glue(system: System, members: tuple[Member, ...]) -> Glue:
     return Glue(system, members, places, tuple(inputs), tuple(outputs))
 
 
-def _config(glue: Glue, guid: str) -> str:
+def _config(glue: Glue) -> str:
     total, shown = glue.places.total, len(glue.outputs)
     n_x, n_u = total["X"], len(glue.inputs)
     n_w = shown + total["Y"] + total["W"] + total["V"]
@@ -159,7 +161,6 @@ def _config(glue: Glue, guid: str) -> str:
         first += size
     tolerance = min(member.config.get("DEFAULT_TOLERANCE", 1e-6) for member in glue.members)
     lines = ["#ifndef MODEL_CONFIG_H", "#define MODEL_CONFIG_H", f"#define MODEL_IDENTIFIER {IDENTIFIER}"]
-    lines.append(f'#define MODEL_GUID "{guid}"')
     lines += [f"#define {name} {value}" for name, value in (sizes | references).items()]
     lines += [f"#define DEFAULT_TOLERANCE {tolerance!r}", f"#define VR_END {first}", "#endif", ""]
     return "\n".join(lines)
@@ -175,7 +176,7 @@ def _build(
     target: Path,
 ) -> None:
     guid = f"{{{code[:8]}-{code[8:12]}-{code[12:16]}-{code[16:20]}-{code[20:32]}}}"
-    config = _config(glue, guid)
+    config = _config(glue)
     xml = merged_description(glue, documents, config, guid, IDENTIFIER, description.default_experiment)
     platform = native_platform()
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -190,6 +191,7 @@ def _build(
             (folder / f"c{k}.c").write_text(member_source(k))
         (folder / "model_config.h").write_text(config)
         (folder / "model.c").write_text(merged_source(glue))
+        (folder / "model_start.c").write_text(f'#include "model.h"\nconst char model_guid[] = "{guid}";\n')
         sources = sorted(path.name for path in folder.glob("*.c"))
         library = folder / f"{IDENTIFIER}{platform.suffix}"
         _compile(folder, sources, platform, library)

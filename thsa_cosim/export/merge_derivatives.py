@@ -26,7 +26,7 @@ def jacobian(glue: Glue) -> list[str]:
         n_x, n_u, at = member.size("N_X"), member.size("N_U"), glue.places.first[member.name]
         lines += [
             "  {",
-            f"    double a[{n_x * n_x + 1}], b[{n_x * n_u + 1}];",
+            f"    double a[{n_x * n_x + 1}] = {{0.0}}, b[{n_x * n_u + 1}] = {{0.0}};",
             f"    if ({prefix(k)}jacobian(AT{k}, a, b, ft + {at['X']})) return 1;",
             f"    for (int j = 0; j < {n_x}; j++)",
             f"      for (int i = 0; i < {n_x}; i++) A[(j + {at['X']}) * N_X + i + {at['X']}] += a[j * {n_x} + i];",

@@ -10,15 +10,15 @@ from thsa_cosim.system.order import stages
 
 _FUNCTIONS = (
     "dependent", "initial", "rhs", "algebraic", "outputs", "indicators", "jacobian", "directional", "time_slopes",
-    "p_start", "u_start", "x_start", "x_nominal", "p_tunable", "text", "pivots", "moving",
+    "p_start", "u_start", "x_start", "guid", "x_nominal", "p_tunable", "text", "pivots", "moving",
 )  # fmt: skip
 _POINT = "double t, const double *x, const double *u, const double *p, const double *d, const double *m"
 
 
 def member_source(index: int) -> str:
-    """A translation unit that compiles one component's ``model.c`` under names of its own."""
+    """A translation unit that compiles one component's model and start values under names of its own."""
     lines = [f"#define model_{name} {prefix(index)}{name}" for name in _FUNCTIONS]
-    return "\n".join([*lines, f'#include "c{index}/model.c"', ""])
+    return "\n".join([*lines, f'#include "c{index}/model.c"', f'#include "c{index}/model_start.c"', ""])
 
 
 def merged_source(glue: Glue) -> str:

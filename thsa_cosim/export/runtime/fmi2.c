@@ -57,7 +57,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     (void)visible;
     if (!functions) return NULL;
     if (!instanceName || !*instanceName) why = "fmi2Instantiate: the instance name is missing";
-    else if (!fmuGUID || strcmp(fmuGUID, MODEL_GUID) != 0) why = "fmi2Instantiate: the GUID is that of another FMU";
+    else if (!fmuGUID || strcmp(fmuGUID, model_guid) != 0) why = "fmi2Instantiate: the GUID is that of another FMU";
     else if (fmuType != fmi2CoSimulation && fmuType != fmi2ModelExchange) why = "fmi2Instantiate: unknown FMU type";
     if (why) {
         if (functions->logger)

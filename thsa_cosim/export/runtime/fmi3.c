@@ -96,7 +96,7 @@ static Component *create(Kind kind, fmi3String name, fmi3String token, fmi3Boole
                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback log_message) {
     Component *self;
     const char *why = !name || !*name                           ? "the instance name is missing"
-                      : !token || strcmp(token, MODEL_GUID) != 0 ? "the instantiation token is that of another FMU"
+                      : !token || strcmp(token, model_guid) != 0 ? "the instantiation token is that of another FMU"
                                                                  : NULL;
     if (why) {
         if (log_message) log_message(environment, fmi3Error, "logStatusError", why);

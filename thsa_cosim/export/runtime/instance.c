@@ -177,6 +177,7 @@ static void update_movers(Instance *c) {
     for (int k = 0; k < N_X; k++)
         if (moves[k] != 0.0) s->mover[s->movers++] = k;
     c->factors_of = -1;
+    memset(c->stage, 0, sizeof c->stage); /* behind the moving states, too: solver.c, add_stages */
 #else
     (void)c;
 #endif

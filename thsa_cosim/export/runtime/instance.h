@@ -73,6 +73,8 @@ typedef struct {
 typedef struct Instance Instance;
 typedef struct Recorder Recorder;
 
+enum { STAGE_WIDTH = N_X / 4 * 4 + 4 }; /* whole lanes: solver.c, add_stages */
+
 struct Instance {
     State s;
     Kind kind;
@@ -98,8 +100,8 @@ struct Instance {
     double lu[N_X * N_X + 1];
     int pivot[N_X + 1], order[N_X + 1];
     double entry[N_X * N_X + 1]; /* of lu beside the diagonal, without zeros: solver.c, compress */
-    int from[N_X * N_X + 1], to[N_X * N_X + 1], lower, entries;
-    double stage[RODAS_STAGES][N_X + 1]; /* of the moving states */
+    int from[N_X * N_X + 1], row[2 * N_X + 1]; /* column of each entry; where each row ends */
+    double stage[RODAS_STAGES][STAGE_WIDTH]; /* of the moving states */
     double x_new[N_X + 1];
     long events, steps, rejected;
     unsigned char asserted[N_A + 1]; /* violations are reported once */

@@ -1,4 +1,4 @@
-/* model.h - what a generated model.c provides to the runtime (see also model_config.h).
+/* model.h - what generated model.c and model_start.c provide to the runtime (see also model_config.h).
  *
  * Between events every relation k is frozen at its mode m[k] (0.0 or 1.0); relation k is true iff g[k] > 0.
  * With m frozen the functions are smooth, so each branch is used beyond its border until the event is located.
@@ -44,7 +44,11 @@
 #error "model_config.h: inconsistent sizes"
 #endif
 
-extern const double model_p_start[], model_u_start[], model_x_start[], model_x_nominal[];
+/* model_start.c: what exports of one model with other values differ in, so that a compiler's cache keeps all the rest */
+extern const double model_p_start[], model_u_start[], model_x_start[];
+extern const char model_guid[]; /* guid (FMI 2.0), instantiation token (FMI 3.0) */
+
+extern const double model_x_nominal[];
 extern const unsigned char model_p_tunable[]; /* 1: may be set while simulating; 0: fixed */
 
 #define MODEL_POINT double t, const double *x, const double *u, const double *p, const double *d, const double *m
@@ -57,7 +61,8 @@ int model_rhs(MODEL_POINT, double *dx);
 int model_algebraic(MODEL_POINT, double *w);   /* all N_W */
 int model_outputs(MODEL_POINT, double *y);     /* the first N_Y of w */
 int model_indicators(MODEL_POINT, double *g);  /* N_G */
-int model_jacobian(MODEL_POINT, double *A, double *B, double *ft);  /* df/dx, df/du, partial df/dt */
+int model_jacobian(MODEL_POINT, double *A, double *B, double *ft);  /* df/dx, df/du, partial df/dt; A and B come with 0 where
+                                                                      * they always are 0: that need not be written */
 int model_directional(MODEL_POINT, const double *sx, const double *su, const double *sp,
                       double *ddx, double *dw);  /* exact directional derivatives of dx and w */
 

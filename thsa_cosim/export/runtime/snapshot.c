@@ -28,7 +28,7 @@ static uint64_t hash(uint64_t seed, const void *bytes, size_t n) { /* FNV-1a, 64
 
 static uint64_t model_hash(void) {
     const int sizes[] = {N_X, N_U, N_P, N_D, N_W, N_Y, N_G};
-    const uint64_t seed = hash(UINT64_C(14695981039346656037), MODEL_GUID, sizeof MODEL_GUID);
+    const uint64_t seed = hash(UINT64_C(14695981039346656037), model_guid, strlen(model_guid) + 1);
     return hash(seed, sizes, sizeof sizes);
 }
 

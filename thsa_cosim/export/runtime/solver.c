@@ -90,39 +90,48 @@ static int factorize(int n_x, double *restrict w, int *restrict pivot) {
     return 0;
 }
 
-/* P W = L D U: the entries of L and U beside the diagonal that are not 0, in the order in which they are used, U's rows over
- * the diagonal D; the swaps as one order. One flat loop over few entries beats nested ones over all. */
+/* P W = L D U: the entries of L and U beside the diagonal that are not 0, in the order in which they are used, row by row,
+ * U's over the diagonal D; the swaps as one order. row[k]: where the k-th of all rows ends, U's from the last one up. */
 static void compress(Instance *c) {
     const int n_x = MOVERS(c);
-    int n = 0;
+    int n = 0, at = 0;
     for (int k = 0; k < n_x; k++) c->order[k] = k;
     for (int k = 0; k < n_x; k++) {
         const int swap = c->order[k];
         c->order[k] = c->order[c->pivot[k]];
         c->order[c->pivot[k]] = swap;
     }
-    for (int k = 0; k < n_x; k++)
-        for (int i = k + 1; i < n_x; i++) {
+    for (int i = 0; i < n_x; i++) {
+        for (int k = 0; k < i; k++) {
             const double value = c->lu[k * n_x + i];
-            if (value != 0.0) c->entry[n] = value, c->from[n] = k, c->to[n++] = i;
+            if (value != 0.0) c->entry[n] = value, c->from[n++] = k;
         }
-    c->lower = n;
-    for (int k = n_x - 1; k >= 0; k--)
-        for (int i = 0; i < k; i++) {
+        c->row[at++] = n;
+    }
+    for (int i = n_x - 1; i >= 0; i--) {
+        for (int k = n_x - 1; k > i; k--) {
             const double value = c->lu[k * n_x + i];
-            if (value != 0.0) c->entry[n] = value * c->lu[i * (n_x + 1)], c->from[n] = k, c->to[n++] = i;
+            if (value != 0.0) c->entry[n] = value * c->lu[i * (n_x + 1)], c->from[n++] = k;
         }
-    c->entries = n;
+        c->row[at++] = n;
+    }
 }
 
 static void solve(const Instance *c, double *restrict b) {
     const int n_x = MOVERS(c);
     double v[N_X];
+    int e = 0, at = 0;
     for (int k = 0; k < n_x; k++) v[k] = b[c->order[k]];
-    for (int e = 0; e < c->lower; e++) v[c->to[e]] -= v[c->from[e]] * c->entry[e];
-    for (int k = 0; k < n_x; k++) v[k] *= c->lu[k * (n_x + 1)];
-    for (int e = c->lower; e < c->entries; e++) v[c->to[e]] -= v[c->from[e]] * c->entry[e];
-    for (int k = 0; k < n_x; k++) b[k] = v[k];
+    for (int i = 0; i < n_x; i++, at++) {
+        double sum = v[i];
+        for (; e < c->row[at]; e++) sum -= v[c->from[e]] * c->entry[e];
+        v[i] = sum;
+    }
+    for (int i = n_x - 1; i >= 0; i--, at++) {
+        double sum = v[i] * c->lu[i * (n_x + 1)];
+        for (; e < c->row[at]; e++) sum -= v[c->from[e]] * c->entry[e];
+        b[i] = v[i] = sum;
+    }
 }
 
 /* By value: terms whose coefficient is 0 may change from 0.0 to -0.0, which is no reason to factorize anew. */
@@ -183,11 +192,25 @@ static int rates(const Instance *c, double time, const double *v, const double *
 #endif
 }
 
+/* v += the weighted sum of the first n stages, in lanes that a compiler turns into vectors; what is behind the moving states
+ * in the last lanes is 0. */
+static void add_stages(const Instance *c, int n, const double *restrict weight, double *restrict v) {
+    enum { LANES = 4 };
+    const int n_x = MOVERS(c);
+    for (int k = 0; k < n_x; k += LANES) {
+        double sum[LANES];
+        for (int i = 0; i < LANES; i++) sum[i] = v[k + i];
+        for (int j = 0; j < n; j++)
+            for (int i = 0; i < LANES; i++) sum[i] += weight[j] * c->stage[j][k + i];
+        for (int i = 0; i < LANES; i++) v[k + i] = sum[i];
+    }
+}
+
 double solver_step(Instance *c, double h) {
     const State *s = &c->s;
     const double *restrict x0 = s->now.x;
     const int n_x = MOVERS(c);
-    double argument[N_X], moved[N_U + 1];
+    double argument[STAGE_WIDTH] = {0.0}, weight[STAGES], moved[N_U + 1];
     const double per_h = 1.0 / h, rounded = leading_digits(h);
 
     c->dense_ready = 0;
@@ -215,8 +238,7 @@ double solver_step(Instance *c, double h) {
         } else {
             if (i < FULL_ROWS) {
                 for (int n = 0; n < n_x; n++) argument[n] = x0[MOVER(c, n)];
-                for (int j = 0; j < i; j++)
-                    for (int n = 0; n < n_x; n++) argument[n] += a[i][j] * c->stage[j][n];
+                add_stages(c, i, a[i], argument);
             } else {
                 for (int n = 0; n < n_x; n++) argument[n] += c->stage[i - 1][n];
             }
@@ -226,10 +248,8 @@ double solver_step(Instance *c, double h) {
                 u = moved;
             }
             if (rates(c, s->now.time + c_[i] * h, argument, u, U)) return -1.0;
-            for (int j = 0; j < i; j++) {
-                const double factor = C[i][j] * per_h;
-                for (int n = 0; n < n_x; n++) U[n] += factor * c->stage[j][n];
-            }
+            for (int j = 0; j < i; j++) weight[j] = C[i][j] * per_h;
+            add_stages(c, i, weight, U);
         }
         if (d_[i] != 0.0)
             for (int n = 0; n < n_x; n++) U[n] += d_[i] * h * c->ft[MOVER(c, n)];
